@@ -1,0 +1,56 @@
+"""Finds the compiled module `lobefit`, or says in one sentence what is wrong with it."""
+
+import functools
+import importlib
+import json
+import platform
+import sys
+import tomllib
+from pathlib import Path
+
+_HERE = Path(__file__).parent
+
+
+@functools.cache
+def problem() -> str:
+    """What keeps the compiled module from being used and what to do; empty when it can be used."""
+    try:
+        module = importlib.import_module("lobefit")
+        compiled = importlib.import_module("lobefit._native")
+    except ModuleNotFoundError:
+        return (
+            f"The compiled part of Lobefit for {_this_python()} is not installed: install the "
+            "Lobefit package for this platform and Blender release."
+        )
+    except (ImportError, OSError) as failure:
+        return (
+            f"The compiled part of Lobefit does not load on this system ({_one_line(failure)}): "
+            "install the Lobefit package for this platform and Blender release."
+        )
+    found = {"version": module.__version__, "build_id": compiled.build_id}
+    for key, wanted in _own_identity().items():
+        if found[key] != wanted:
+            return (
+                f"Lobefit's add-on is of {key.replace('_', ' ')} {wanted[:12]} and its compiled "
+                f"part of {found[key][:12]}: restart Blender, and if that does not help remove "
+                "Lobefit and install it again."
+            )
+    return ""
+
+
+def _own_identity() -> dict[str, str]:
+    """The version of the add-on and, where it was packaged, the build it was packaged with."""
+    manifest = tomllib.loads((_HERE / "blender_manifest.toml").read_text(encoding="utf-8"))
+    identity = {"version": manifest["version"]}
+    build = _HERE / "build.json"
+    if build.is_file():
+        identity |= json.loads(build.read_text(encoding="utf-8"))
+    return identity
+
+
+def _this_python() -> str:
+    return f"Python {sys.version_info[0]}.{sys.version_info[1]} on {platform.machine()}"
+
+
+def _one_line(failure: Exception) -> str:
+    return " ".join(str(failure).split()).rstrip(".")

@@ -1,0 +1,32 @@
+"""What a user can do; nothing here changes data-blocks before its last step."""
+
+import bpy
+
+from . import preview
+from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
+from .import_measured import LOBEFIT_FH_measured, LOBEFIT_OT_import_measured, draw_menu
+from .run import current
+
+_CLASSES = (
+    LOBEFIT_OT_import_measured,
+    LOBEFIT_FH_measured,
+    LOBEFIT_OT_fit,
+    LOBEFIT_OT_cancel_fit,
+)
+
+
+def register() -> None:
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    preview.register()
+    bpy.types.TOPBAR_MT_file_import.append(draw_menu)
+
+
+def unregister() -> None:
+    # Blender does not call an operator's `cancel` when its class goes.
+    if current():
+        current().end()
+    bpy.types.TOPBAR_MT_file_import.remove(draw_menu)
+    preview.unregister()
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

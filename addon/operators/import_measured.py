@@ -1,0 +1,81 @@
+"""File > Import > Measured BRDF, and the same by dropping files on a window."""
+
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ..jobs import Outcome
+from ..nodes.material import build_material
+from ..properties import draw_fit_options
+from .run import RunsFits
+
+
+class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
+    """Fit measured reflectance files and make a material of each"""
+
+    bl_idname = "lobefit.import_measured"
+    bl_label = "Import Measured BRDF"
+    bl_options: ClassVar = {"REGISTER", "PRESET"}
+
+    filename_ext = ".binary"
+    filter_glob: StringProperty(default="*.binary", options={"HIDDEN"})
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
+    assign: BoolProperty(
+        name="Assign to Object",
+        default=True,
+        description="Put the first material into the active object's active slot",
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Asks for files, unless they were dropped."""
+        if self.directory and self.files:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        names = [item.name for item in self.files if item.name]
+        paths = [str(Path(self.directory) / name) for name in names] or [self.filepath]
+        if not Path(paths[0]).name:
+            return self.refuse("Expected at least one measured file, found none chosen.")
+        return self.fit(context, [bpy.path.abspath(path) for path in paths])
+
+    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
+        materials = [build_material(outcome.record) for outcome in done]
+        target = context.active_object if self.assign else None
+        if target is not None and hasattr(target.data, "materials") and target.is_editable:
+            target.active_material = materials[0]
+        for material in materials:
+            # A material without a user would be lost when the file is saved.
+            material.use_fake_user = material.users == 0
+        return ""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        draw_fit_options(self.layout, self)
+        self.layout.prop(self, "assign")
+
+
+class LOBEFIT_FH_measured(bpy.types.FileHandler):
+    """Files of measured reflectance that are dropped on a window"""
+
+    bl_idname = "LOBEFIT_FH_measured"
+    bl_label = "Measured BRDF"
+    bl_import_operator = LOBEFIT_OT_import_measured.bl_idname
+    bl_file_extensions = ".binary"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type in {"VIEW_3D", "PROPERTIES"}
+
+
+def draw_menu(self, context: bpy.types.Context) -> None:
+    """The entry in File > Import."""
+    self.layout.operator(
+        LOBEFIT_OT_import_measured.bl_idname, text="Measured BRDF (.binary)", icon="MATERIAL"
+    )

@@ -1,0 +1,137 @@
+"""Properties > Material > Measured BRDF, and the progress of a fit in the status bar."""
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from . import native
+from .operators.fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
+from .operators.import_measured import LOBEFIT_OT_import_measured
+from .operators.preview import LOBEFIT_OT_preview, icons_of
+from .operators.run import current
+from .properties import MODELS, draw_fit_options
+from .records import active_material, record_of
+
+# Up to which part of the reflected light that is off, what to call a fit.
+_JUDGEMENTS = ((0.05, "Very close"), (0.15, "Close"), (0.3, "Recognisable"), (1e9, "Far off"))
+
+
+class LOBEFIT_PT_measured_brdf(bpy.types.Panel):
+    """Where a material comes from, how close it is, and how to fit it anew"""
+
+    bl_label = "Measured BRDF"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "material"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        characters = _characters(context)
+        if native.problem():
+            _paragraph(layout, native.problem(), "ERROR", characters)
+        material = active_material(context)
+        record = record_of(material)
+        if current():
+            draw_progress(layout)
+        elif record is None:
+            _draw_hint(layout, material, characters)
+        if record is not None:
+            _draw_record(layout, record, characters)
+            _draw_fit(layout, context)
+            _draw_preview(layout, material)
+
+
+def draw_progress(layout: Any) -> None:
+    """A bar with what is being fitted, and the way to end it."""
+    batch = current().batch
+    row = layout.row(align=True)
+    row.progress(factor=batch.progress, text=batch.text)
+    row.operator(LOBEFIT_OT_cancel_fit.bl_idname, text="", icon="X")
+
+
+def _draw_status(self: Any, context: bpy.types.Context) -> None:
+    if current():
+        row = self.layout.row()
+        row.ui_units_x = 16
+        draw_progress(row)
+
+
+def _draw_hint(layout: Any, material: bpy.types.Material | None, characters: int) -> None:
+    what = "No material is selected." if material is None else "This material is not measured."
+    _paragraph(layout, f"{what} Import a measurement to make one:", "INFO", characters)
+    layout.operator(LOBEFIT_OT_import_measured.bl_idname, icon="IMPORT")
+
+
+def _draw_record(layout: Any, record: dict[str, Any], characters: int) -> None:
+    source, parameters = record["source"], record["parameters"]
+    error = record["error"]["relative_l1_cosine"]["pooled"]
+    column = layout.column(align=True)
+    for name, value in {
+        "Source": Path(source["path"]).name if source["path"] else source["format"],
+        "Model": {key: label for key, label, _ in MODELS}[record["model"]],
+        "Diffuse": _numbers(parameters["diffuse"]),
+        "Specular": _numbers(parameters["specular"]),
+        "Exponent": _numbers(parameters["exponent"]),
+        "Interpolation": _numbers(parameters["interpolation"]),
+        "IOR": _numbers(parameters["ior"]) or "no Fresnel",
+    }.items():
+        if value:
+            split = column.split(factor=0.35)
+            split.label(text=name)
+            split.label(text=value)
+    if error is not None:
+        judgement = next(text for limit, text in _JUDGEMENTS if error <= limit)
+        sentence = f"{judgement}: {error:.1%} of the reflected light is off."
+        _paragraph(layout, sentence, "INFO", characters)
+    for warning in record["warnings"]:
+        _paragraph(layout, warning, "ERROR", characters)
+
+
+def _draw_fit(layout: Any, context: bpy.types.Context) -> None:
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    idname = LOBEFIT_OT_fit.bl_idname
+    draw_fit_options(column, context.window_manager.operator_properties_last(idname))
+    row = layout.row()
+    row.operator(idname, text="Fit", icon="FILE_REFRESH")
+    row.operator(LOBEFIT_OT_preview.bl_idname, text="Preview", icon="SHADING_RENDERED")
+
+
+def _draw_preview(layout: Any, material: bpy.types.Material) -> None:
+    row = layout.row()
+    for title, icon in icons_of(material).items():
+        column = row.column()
+        column.template_icon(icon, scale=5)
+        column.label(text=title)
+
+
+def _numbers(values: Any) -> str:
+    """One number or three as text; empty for None."""
+    if values is None:
+        return ""
+    return "  ".join(f"{value:.3g}" for value in (values if isinstance(values, list) else [values]))
+
+
+def _paragraph(layout: Any, text: str, icon: str, characters: int) -> None:
+    column = layout.column(align=True)
+    for index, line in enumerate(textwrap.wrap(text, characters)):
+        column.label(text=line, icon="BLANK1" if index else icon)
+
+
+def _characters(context: bpy.types.Context) -> int:
+    """How many characters fit beside an icon into a line of the region."""
+    scale = context.preferences.system.ui_scale
+    return max(20, int(context.region.width / (6.2 * scale)) - 6) if context.region else 60
+
+
+def register() -> None:
+    bpy.utils.register_class(LOBEFIT_PT_measured_brdf)
+    bpy.types.STATUSBAR_HT_header.append(_draw_status)
+
+
+def unregister() -> None:
+    bpy.types.STATUSBAR_HT_header.remove(_draw_status)
+    bpy.utils.unregister_class(LOBEFIT_PT_measured_brdf)

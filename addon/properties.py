@@ -1,0 +1,54 @@
+"""The options of a fit, as properties that every operator which fits has.
+
+What the user chose last lives with the operator (`operator_properties_last`) and a fit under way in
+`operators.run`: nothing of it is saved in files, which hold only the record in each material.
+"""
+
+from typing import Any
+
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+
+MODELS = (
+    ("interpolated", "Interpolated", "A blend of the two others, and closer than both"),
+    ("modified-phong", "Modified Phong", "A lobe around the mirror direction"),
+    ("modified-blinn-phong", "Modified Blinn-Phong", "A lobe around the half vector"),
+)
+NORMS = (
+    ("cosine-l1", "As Seen", "Weighted with the cosine of the light, as a picture shows it"),
+    ("l1", "L1", "The plain sum of differences, as in the paper"),
+    ("l2", "L2", "Squared differences: the highlight's peak counts most"),
+    ("log-l2", "Logarithmic", "Squared differences of logarithms: dark parts count as much"),
+)
+
+
+class FitOptions:
+    """How to fit; mixed into operators."""
+
+    model: EnumProperty(
+        name="Model", items=MODELS, default="interpolated", description="The lobe to fit"
+    )
+    fresnel: BoolProperty(
+        name="Fresnel", default=True, description="Let the lobe grow toward grazing angles"
+    )
+    norm: EnumProperty(
+        name="Match",
+        items=NORMS,
+        default="cosine-l1",
+        description=(
+            "What the fit makes small. As Seen by default, because the material is made to be "
+            "looked at"
+        ),
+    )
+    threads: IntProperty(
+        name="Threads", default=0, min=0, max=1024, description="Processors to use; 0 for all"
+    )
+
+    def fit_options(self) -> dict[str, Any]:
+        """The options as `lobefit.start_fit` takes them."""
+        return {name: getattr(self, name) for name in FitOptions.__annotations__}
+
+
+def draw_fit_options(layout: Any, options: Any) -> None:
+    """Draws the options; `options` is an operator or its last properties."""
+    for name in FitOptions.__annotations__:
+        layout.prop(options, name)

@@ -1,0 +1,24 @@
+"""Materials and the records they carry, read also where the compiled module cannot be loaded."""
+
+import json
+from typing import Any
+
+import bpy
+
+KEY = "lobefit_record"
+
+
+def active_material(context: bpy.types.Context) -> bpy.types.Material | None:
+    """The material of the editor, which may be pinned, or else of the active object."""
+    material = getattr(context, "material", None)
+    if material is None and context.active_object is not None:
+        material = context.active_object.active_material
+    return material
+
+
+def record_of(material: bpy.types.Material | None) -> dict[str, Any] | None:
+    """The entries of the record (RECORD.json) in a material, or None if it has none to be read."""
+    try:
+        return json.loads(material[KEY])
+    except (KeyError, TypeError, ValueError):
+        return None

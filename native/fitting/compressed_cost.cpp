@@ -1,0 +1,94 @@
+#include "fitting/compressed_cost.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lobefit {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+CompressedCost::CompressedCost(const Objective& objective, std::vector<int> free, VectorXd x,
+                               const Monitor& monitor)
+    : objective_(objective), free_(std::move(free)), x_(std::move(x)), monitor_(monitor) {
+  set_num_residuals(static_cast<int>(free_.size()) + 1);
+  mutable_parameter_block_sizes()->push_back(static_cast<int>(free_.size()));
+}
+
+VectorXd CompressedCost::within_bounds(const double* free_values) const {
+  const VectorXd& lower = objective_.variables().lower();
+  const VectorXd& upper = objective_.variables().upper();
+  VectorXd step = VectorXd::Zero(x_.size());
+  double share = 1;
+  int met = -1;
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    const int v = free_[i];
+    step[v] = free_values[i] - x_[v];
+    const double room = (step[v] < 0 ? lower[v] : upper[v]) - x_[v];
+    if (room == 0) {
+      step[v] = 0;  // at its bound already, and staying there
+    } else if (room / step[v] < share) {
+      share = room / step[v];
+      met = v;
+    }
+  }
+  VectorXd x = objective_.variables().clamp(x_ + share * step);
+  // To the last bit, so that the variable is known to stand at its bound.
+  if (met >= 0) x[met] = step[met] < 0 ? lower[met] : upper[met];
+  return x;
+}
+
+bool CompressedCost::left_bounds(const double* free_values) const {
+  return within_bounds(free_values)(free_) !=
+         Eigen::Map<const VectorXd>(free_values, static_cast<Eigen::Index>(free_.size()));
+}
+
+bool CompressedCost::compress(const double* free_values, Curvature curvature) const {
+  const auto n = static_cast<Eigen::Index>(free_.size());
+  const VectorXd x = within_bounds(free_values);
+  const Evaluation at = objective_.evaluate(x, curvature);
+  const VectorXd gradient = at.gradient(free_);
+  const MatrixXd hessian = at.hessian(free_, free_);
+  // Columns are scaled to a unit diagonal, because k_s and log s differ by many orders; a variable
+  // without effect (the shape of a lobe of k_s = 0) gets a diagonal of its own.
+  const VectorXd diagonal = hessian.diagonal();
+  const VectorXd scale = (diagonal.array() > 0).select(diagonal.array().sqrt(), 1.0);
+  MatrixXd scaled = scale.cwiseInverse().asDiagonal() * hessian * scale.cwiseInverse().asDiagonal();
+  scaled.diagonal().array() += 1e-12;
+  const Eigen::LLT<MatrixXd, Eigen::Upper> factor(scaled);
+  const MatrixXd root = factor.matrixU();
+  const VectorXd projected =
+      root.transpose().triangularView<Eigen::Lower>().solve(gradient.cwiseQuotient(scale));
+  const double rest = at.value - projected.squaredNorm();
+  if (!(rest >= 0) && curvature == Curvature::newton) return false;
+  jacobian_ = MatrixXd::Zero(n + 1, n);
+  jacobian_.topRows(n) = root * scale.asDiagonal();
+  residuals_.resize(n + 1);
+  residuals_.head(n) = projected;
+  residuals_[n] = std::sqrt(std::max(0.0, rest));
+  return true;
+}
+
+bool CompressedCost::Evaluate(double const* const* parameters, double* residuals,
+                              double** jacobians) const {
+  if (monitor_.cancelled()) return false;
+  const auto n = static_cast<Eigen::Index>(free_.size());
+  const Eigen::Map<const VectorXd> point(parameters[0], n);
+  if (known_point_.size() != n || known_point_ != point) {
+    if (!compress(parameters[0], Curvature::newton)) {
+      compress(parameters[0], Curvature::reweighted);
+    }
+    known_point_ = point;
+  }
+  Eigen::Map<VectorXd>(residuals, n + 1) = residuals_;
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Eigen::Map<RowMajor>(jacobians[0], n + 1, n) = jacobian_;
+    if (!left_bounds(parameters[0])) x_(free_) = point;
+  }
+  return true;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,60 @@
+// The whole objective as one Ceres cost.
+#pragma once
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "fitting/monitor.h"
+#include "fitting/objective.h"
+
+namespace lobefit {
+
+// A block of n + 1 residuals for n free variables whose half squared norm, gradient and
+// Gauss-Newton matrix are those of Objective: with H = R'R, g = J'Wr and F,
+//
+//   residuals = [R^-T g ; sqrt(F - |R^-T g|^2)],  Jacobian = [R ; 0].
+//
+// A Ceres LossFunction could not do this (it acts on the squared norm of a whole block), and a
+// block a bin takes 75 times as long. The Jacobian is not the derivative of the residuals one by
+// one; only J'r and J'J mean something.
+//
+// H is Newton's wherever a sum of squares can have it, which is close to the minimum; elsewhere it
+// is that of reweighted squares, for which F >= |R^-T g|^2 always.
+//
+// A step that leaves the bounds is cut where it first meets one; the solver is then to be stopped
+// (left_bounds) and started again without the variable that met its bound. Ceres' own bounds are
+// not used: they leave the other variables where a step over the bound would have had them.
+class CompressedCost final : public ceres::CostFunction {
+ public:
+  // Moves the variables `free` of x; the others keep their values.
+  CompressedCost(const Objective& objective, std::vector<int> free, Eigen::VectorXd x,
+                 const Monitor& monitor);
+
+  // False (which ends the solver) when the monitor was cancelled.
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+  // All variables at these values of the free ones, the last step cut at the bounds.
+  Eigen::VectorXd within_bounds(const double* free_values) const;
+
+  // Whether these values are cut.
+  bool left_bounds(const double* free_values) const;
+
+ private:
+  // False where the curvature is Newton's and too small for a sum of squares: F < |R^-T g|^2.
+  bool compress(const double* free_values, Curvature curvature) const;
+
+  const Objective& objective_;
+  std::vector<int> free_;
+  // Where the derivatives were last asked for: the point that the next step starts from.
+  mutable Eigen::VectorXd x_;
+  const Monitor& monitor_;
+  // Ceres asks for value and derivatives of one point in two calls; the second is answered from
+  // here.
+  mutable Eigen::VectorXd known_point_, residuals_;
+  mutable Eigen::MatrixXd jacobian_;
+};
+
+}  // namespace lobefit

@@ -1,0 +1,206 @@
+#include "fitting/fit.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "fitting/minimise.h"
+#include "fitting/objective.h"
+#include "fitting/parallel.h"
+#include "fitting/samples.h"
+#include "fitting/scan.h"
+#include "fitting/variables.h"
+
+namespace lobefit {
+namespace {
+
+using Eigen::VectorXd;
+
+// Samples of the scan, and of the polish of its candidates: the latter is some 2 % of a table.
+constexpr std::size_t scan_samples = 3000, candidate_samples = 12000;
+constexpr std::size_t max_candidates = 6;
+// Starts that end this close to the best one, relatively, have found the same optimum.
+constexpr double agreement = 0.005;
+constexpr const char* scan_stage = "Looking for starts";
+
+// Whether the interpolated lobe is Phong's or Blinn-Phong's.
+bool is_pure(double interpolation) { return interpolation == 0 || interpolation == 1; }
+
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+class Fitter {
+ public:
+  Fitter(const Measurement& measurement, const FitOptions& options, Monitor& monitor)
+      : measurement_(measurement),
+        options_(options),
+        monitor_(monitor),
+        threads_(thread_count(options.threads)),
+        variables_(options.kind, options.fresnel, options.separate_channels),
+        all_(all_samples(measurement, options)) {}
+
+  Fit run() {
+    const Stopwatch start_watch;
+    monitor_.report(scan_stage, 0.1);
+    std::vector<Candidate> starts = scan_shapes(subsample(all_, scan_samples), variables_,
+                                                options_.norm, max_candidates, threads_, monitor_);
+    fit_.start_seconds = start_watch.seconds();
+    const Stopwatch fit_watch;
+    const VectorXd x = options_.schedule == Schedule::stages ? run_stages(starts.front().x)
+                                                             : run_polish(std::move(starts));
+    fit_.fit_seconds = fit_watch.seconds();
+    fit_.parameters = variables_.to_parameters(x, all_.unit);
+    monitor_.report("Measuring the error", 0.95);
+    fit_.errors = error_figures(measurement_, fit_.parameters, threads_);
+    name_degenerate(x);
+    return std::move(fit_);
+  }
+
+ private:
+  VectorXd run_stages(VectorXd x) {
+    const std::pair<const char*, std::vector<int>> stages[] = {
+        {"(i) rho_d, k_s", variables_.reflectances()},
+        {"(ii) s, alpha, eta", variables_.shape()},
+        {"(iii) s, alpha, k_s, eta", variables_.shape_and_specular()}};
+    double progress = 0.2;
+    for (const auto& [name, free] : stages) {
+      monitor_.report("Fitting by the paper's stages", progress);
+      x = run_stage(name, free, x, fine_precision());
+      progress += 0.25;
+    }
+    return x;
+  }
+
+  VectorXd run_polish(std::vector<Candidate> candidates) {
+    monitor_.report("Trying the starts", 0.3);
+    const Stopwatch watch;
+    const Samples some = subsample(all_, candidate_samples);
+    std::vector<Minimum> minima(candidates.size());
+    parallel_for(static_cast<int>(candidates.size()), threads_, [&](int i) {
+      minima[static_cast<std::size_t>(i)] =
+          stages_and_polish(some, candidates[static_cast<std::size_t>(i)].x);
+    });
+    std::sort(minima.begin(), minima.end(), [](const Minimum& left, const Minimum& right) {
+      return left.true_value < right.true_value;
+    });
+    judge_certainty(minima);
+    const int iterations =
+        std::accumulate(minima.begin(), minima.end(), 0,
+                        [](int sum, const Minimum& m) { return sum + m.iterations; });
+    fit_.stages.push_back(
+        {"stages and polish of " + std::to_string(minima.size()) + " starts on a subsample",
+         mean_error(minima.front().x), watch.seconds(), iterations});
+    monitor_.report("Polishing on all bins", 0.6);
+    return run_stage("polish on all bins", variables_.all(), minima.front().x,
+                     finishing_precision());
+  }
+
+  // A start with alpha at 0 or 1 keeps it there until the polish on all bins, so that the result is
+  // no worse than the pure Phong or Blinn-Phong lobe: for s near 0 the objective jumps where bins
+  // leave the lobe, and a subsample sees too few of those.
+  Minimum stages_and_polish(const Samples& samples, const VectorXd& start) const {
+    const int alpha = variables_.interpolation();
+    const bool held = alpha >= 0 && is_pure(start[alpha]);
+    const auto held_back = [&](std::vector<int> free) {
+      if (held) std::erase(free, alpha);
+      return free;
+    };
+    Minimum minimum{start, 0, 0, false};
+    for (const std::vector<int>& free :
+         {variables_.reflectances(), held_back(variables_.shape()),
+          held_back(variables_.shape_and_specular()), held_back(variables_.all())}) {
+      const int before = minimum.iterations;
+      minimum = minimise(samples, variables_, options_.norm, free, minimum.x, coarse_precision(), 1,
+                         monitor_);
+      minimum.iterations += before;
+    }
+    return minimum;
+  }
+
+  VectorXd run_stage(const std::string& name, const std::vector<int>& free, const VectorXd& x,
+                     const Precision& precision) {
+    const Stopwatch watch;
+    const Minimum minimum =
+        minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_);
+    fit_.converged = minimum.converged;
+    fit_.stages.push_back({name, mean_error(minimum.x), watch.seconds(), minimum.iterations});
+    return minimum.x;
+  }
+
+  double mean_error(const VectorXd& x) const {
+    const Objective objective(all_, variables_, options_.norm, 1, threads_);
+    const double weight = std::accumulate(all_.weight.begin(), all_.weight.end(), 0.0);
+    constexpr double values_of_a_sample = 6;  // three channels, two halves
+    const bool linear = options_.norm == Norm::l1 || options_.norm == Norm::cosine_l1;
+    const double unit = linear ? all_.unit : options_.norm == Norm::l2 ? all_.unit * all_.unit : 1;
+    return objective.evaluate(x).true_value * unit / (values_of_a_sample * weight);
+  }
+
+  // A start that held alpha cannot agree unless the optimum is a pure lobe; it counts only then.
+  void judge_certainty(const std::vector<Minimum>& sorted) {
+    const double best = sorted.front().true_value;
+    const int alpha = variables_.interpolation();
+    double worst = best;
+    for (const Minimum& m : sorted) {
+      const bool agrees = m.true_value <= (1 + agreement) * best;
+      if (!agrees && alpha >= 0 && is_pure(m.x[alpha])) continue;
+      ++fit_.certainty.starts;
+      if (agrees) ++fit_.certainty.agree;
+      worst = std::max(worst, m.true_value);
+    }
+    fit_.certainty.spread = best > 0 ? (worst - best) / best : 0;
+  }
+
+  void name_degenerate(const VectorXd& x) {
+    const auto warn = [&](const char* sentence) { fit_.warnings.emplace_back(sentence); };
+    const bool no_specular = !(x.segment<3>(Variables::specular).maxCoeff() > 0);
+    if (no_specular) {
+      warn(
+          "The fit has no specular part; exponent, interpolation and index of refraction mean "
+          "nothing.");
+    }
+    if (!(x.segment<3>(Variables::diffuse).maxCoeff() > 0)) warn("The fit has no diffuse part.");
+    if (no_specular) return;
+    const auto at_bound = [&](int i) {
+      return i >= 0 && (x[i] <= variables_.lower()[i] || x[i] >= variables_.upper()[i]);
+    };
+    for (int i = 0; i < variables_.exponents(); ++i) {
+      if (at_bound(Variables::log_exponent + i)) {
+        warn("The exponent stands at the end of its range; the data do not determine it.");
+      } else if (x[Variables::log_exponent + i] < std::log(0.5)) {
+        warn("The exponent is below 0.5; the lobe is as wide as a diffuse part.");
+      }
+    }
+    const int ior = variables_.log_excess_ior();
+    if (at_bound(ior) || (ior >= 0 && x[ior] < std::log(0.01))) {
+      warn(
+          "The index of refraction is at the edge of what the data determine; with the specular "
+          "coefficient it makes one number.");
+    }
+  }
+
+  const Measurement& measurement_;
+  const FitOptions options_;
+  Monitor& monitor_;
+  const int threads_;
+  const Variables variables_;
+  const Samples all_;
+  Fit fit_;
+};
+
+}  // namespace
+
+Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor) {
+  return Fitter(measurement, options, monitor).run();
+}
+
+}  // namespace lobefit

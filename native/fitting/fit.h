@@ -1,0 +1,47 @@
+// The fit of a model to a measurement.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fitting/error_figures.h"
+#include "fitting/monitor.h"
+#include "fitting/options.h"
+#include "measurement/measurement.h"
+#include "reflectance/model.h"
+
+namespace lobefit {
+
+// One step of a schedule; error is the mean misfit over all bins afterwards, in the norm that is
+// fitted (1/sr for the L1 norms).
+struct Stage {
+  std::string name;
+  double error;
+  double seconds;
+  int iterations;
+};
+
+// How sure the result is: of the `starts` that were polished on a subsample, `agree` ended within
+// 0.5 % of the best; spread is (worst - best) / best.
+struct Certainty {
+  int starts = 0;
+  int agree = 0;
+  double spread = 0;
+};
+
+struct Fit {
+  Parameters parameters;
+  ErrorFigures errors;
+  std::vector<Stage> stages;
+  double start_seconds = 0, fit_seconds = 0;
+  bool converged = false;
+  Certainty certainty;
+  std::vector<std::string> warnings;  // what is degenerate in the result, a sentence each
+};
+
+// Starts come from the data (scan_shapes). Schedule::stages then runs the paper's three stages on
+// all bins from the best of them; Schedule::polish runs stages and joint polish from each of them
+// on a subsample, and polishes the best on all bins. Throws Cancelled.
+Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor);
+
+}  // namespace lobefit

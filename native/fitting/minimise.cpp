@@ -1,0 +1,118 @@
+#include "fitting/minimise.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+
+#include "fitting/compressed_cost.h"
+#include "fitting/objective.h"
+
+namespace lobefit {
+namespace {
+
+using Eigen::VectorXd;
+
+// The free variables that can move: not those at a bound with the descent pointing outward.
+std::vector<int> movable(const Variables& variables, const std::vector<int>& free,
+                         const VectorXd& x, const VectorXd& gradient) {
+  std::vector<int> result;
+  for (const int i : free) {
+    const bool held = (x[i] <= variables.lower()[i] && gradient[i] >= 0) ||
+                      (x[i] >= variables.upper()[i] && gradient[i] <= 0);
+    if (!held) result.push_back(i);
+  }
+  return result;
+}
+
+ceres::Solver::Options solver_options(const Precision& precision) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = precision.iterations;
+  options.function_tolerance = precision.tolerance;
+  options.gradient_tolerance = 0;
+  options.parameter_tolerance = 1e-10;
+  options.initial_trust_region_radius = 1e6;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+// Ends a solve whose step met a bound.
+class StopAtBound final : public ceres::IterationCallback {
+ public:
+  StopAtBound(const CompressedCost& cost, const VectorXd& values) : cost_(cost), values_(values) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return cost_.left_bounds(values_.data()) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                             : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const CompressedCost& cost_;
+  const VectorXd& values_;
+};
+
+// Solves for the variables `moved`, to convergence or to the first bound that is met.
+void solve(const Objective& objective, const std::vector<int>& moved, const Precision& precision,
+           const Monitor& monitor, Minimum& minimum) {
+  VectorXd values = minimum.x(moved);
+  CompressedCost cost(objective, moved, minimum.x, monitor);
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(ownership);
+  problem.AddResidualBlock(&cost, nullptr, values.data());
+  StopAtBound stop_at_bound(cost, values);
+  ceres::Solver::Options options = solver_options(precision);
+  options.callbacks.push_back(&stop_at_bound);
+  options.update_state_every_iteration = true;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  monitor.throw_if_cancelled();
+  minimum.iterations += static_cast<int>(summary.iterations.size());
+  minimum.converged = summary.termination_type == ceres::CONVERGENCE;
+  minimum.x = cost.within_bounds(values.data());
+}
+
+// One level: solves, and again as long as variables meet their bounds or come free of them.
+void solve_level(const Objective& objective, const std::vector<int>& free,
+                 const Precision& precision, const Monitor& monitor, Minimum& minimum) {
+  constexpr int max_rounds = 30;
+  std::vector<int> moved;
+  for (int round = 0; round < max_rounds; ++round) {
+    monitor.throw_if_cancelled();
+    const VectorXd gradient = objective.evaluate(minimum.x).gradient;
+    std::vector<int> now = movable(objective.variables(), free, minimum.x, gradient);
+    if (now.empty() || (minimum.converged && now == moved)) return;
+    moved = std::move(now);
+    solve(objective, moved, precision, monitor, minimum);
+  }
+}
+
+bool has_smoothing(Norm norm) { return norm == Norm::l1 || norm == Norm::cosine_l1; }
+
+}  // namespace
+
+Precision coarse_precision() { return {{0.3, 0.1, 0.03}, 1e-5, 60}; }
+Precision fine_precision() { return {{0.1, 0.03, 0.01}, 1e-7, 100}; }
+Precision finishing_precision() { return {{0.03, 0.01}, 1e-7, 100}; }
+
+Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
+                 const std::vector<int>& free, const VectorXd& x, const Precision& precision,
+                 int threads, const Monitor& monitor) {
+  Minimum best{variables.clamp(x), std::numeric_limits<double>::infinity(), 0, false};
+  Minimum current = best;
+  const std::size_t levels = has_smoothing(norm) ? precision.smoothing.size() : 1;
+  for (std::size_t level = 0; level < levels; ++level) {
+    const Objective objective(samples, variables, norm, precision.smoothing[level], threads);
+    current.converged = false;
+    solve_level(objective, free, precision, monitor, current);
+    current.true_value = objective.evaluate(current.x).true_value;
+    const double gain = best.true_value - current.true_value;
+    if (gain > 0) best = current;
+    best.iterations = current.iterations;
+    if (gain < 1e-6 * best.true_value && level > 0) break;
+  }
+  return best;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,176 @@
+#include "fitting/objective.h"
+
+#include <cmath>
+#include <vector>
+
+#include "fitting/kernel.h"
+#include "fitting/parallel.h"
+#include "reflectance/fresnel.h"
+
+namespace lobefit {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+KernelNorm kernel_norm(Norm norm) {
+  switch (norm) {
+    case Norm::l2:
+      return KernelNorm::l2;
+    case Norm::log_l2:
+      return KernelNorm::log_l2;
+    case Norm::l1:
+    case Norm::cosine_l1:
+      break;
+  }
+  return KernelNorm::smoothed_l1;
+}
+
+// The variables of the lobe k_s R_F base^s that every model is (as_interpolated): rho_d/pi of
+// three channels, k_s of three, log s of each group of channels with one exponent, alpha,
+// log(eta - 1). The kernel knows these alone.
+struct LobeVariables {
+  explicit LobeVariables(int groups) : alpha(6 + groups), third(7 + groups), count(8 + groups) {}
+  int alpha, third, count;
+};
+
+// k_s and its logarithmic slope by log s for the models whose coefficient is rho_s.
+struct SpecularScale {
+  double factor, log_slope;
+};
+
+SpecularScale scale_at(ModelKind kind, double s) {
+  const double factor = specular_scale(kind, s);
+  if (kind == ModelKind::interpolated) return {factor, 0};
+  const double shift = kind == ModelKind::modified_phong ? 2 : 8;
+  return {factor, s / (s + shift)};
+}
+
+class Assembly {
+ public:
+  Assembly(const Variables& variables, const VectorXd& x)
+      : variables_(variables),
+        x_(x),
+        parameters_(as_interpolated(variables.to_parameters(x, 1))),
+        lobe_(variables.exponents()) {}
+
+  int groups() const { return variables_.exponents(); }
+
+  KernelInput input(const Samples& samples, const Samples::Run& run, int group, double smoothing,
+                    Curvature curvature) const {
+    const int first = groups() == 1 ? 0 : group, channels = groups() == 1 ? 3 : 1;
+    KernelInput in{};
+    in.count = run.end - run.begin;
+    in.u_phong = samples.u_phong.data() + run.begin;
+    in.u_blinn = samples.u_blinn.data() + run.begin;
+    in.weight = samples.weight.data() + run.begin;
+    in.channels = channels;
+    for (int c = 0; c < channels; ++c) {
+      in.diffuse[c] = parameters_.diffuse[first + c] / pi;
+      in.specular[c] = parameters_.specular[first + c];
+      for (int half = 0; half < 2; ++half) {
+        in.measured[c][half] = samples.measured[first + c][half].data() + run.begin;
+      }
+    }
+    in.exponent = parameters_.exponent[first];
+    in.interpolation = parameters_.interpolation;
+    in.fresnel = 1;
+    if (parameters_.ior) {
+      const FresnelReflectance fresnel = fresnel_reflectance(run.cos_theta_d, *parameters_.ior);
+      in.fresnel = fresnel.value;
+      in.fresnel_slope = fresnel.derivative * (*parameters_.ior - 1);
+    }
+    in.smoothing = smoothing;
+    in.newton = curvature == Curvature::newton;
+    return in;
+  }
+
+  // Gradient and matrix by the lobe's variables, from the sums of one group over all runs.
+  void add(const KernelSums& sums, int group, VectorXd& gradient, MatrixXd& hessian) const {
+    const int first = groups() == 1 ? 0 : group, channels = groups() == 1 ? 3 : 1;
+    const int shape[3] = {6 + group, lobe_.alpha, lobe_.third};
+    for (int c = 0; c < channels; ++c) {
+      const int d = first + c, k = 3 + first + c;
+      const double specular = parameters_.specular[first + c];
+      gradient[d] += sums.r[c];
+      gradient[k] += sums.rg[c];
+      hessian(d, d) += sums.w[c];
+      hessian(k, d) += sums.wg[c];
+      hessian(k, k) += sums.wgg[c];
+      for (int x = 0; x < 3; ++x) {
+        hessian(shape[x], d) += specular * sums.wx[c][x];
+        hessian(shape[x], k) += specular * sums.wgx[c][x];
+      }
+    }
+    int pair = 0;
+    for (int x = 0; x < 3; ++x) {
+      gradient[shape[x]] += sums.rx[x];
+      for (int y = x; y < 3; ++y) hessian(shape[y], shape[x]) += sums.wxx[pair++];
+    }
+  }
+
+  // d(lobe's variables) / d(fit's variables).
+  MatrixXd chain() const {
+    MatrixXd chain = MatrixXd::Zero(lobe_.count, variables_.count());
+    chain.block<3, 3>(0, Variables::diffuse).setIdentity();
+    for (int c = 0; c < 3; ++c) {
+      const int exponent = Variables::log_exponent + (groups() == 3 ? c : 0);
+      const SpecularScale scale = scale_at(variables_.kind(), std::exp(x_[exponent]));
+      chain(3 + c, Variables::specular + c) = scale.factor;
+      chain(3 + c, exponent) = parameters_.specular[c] * scale.log_slope;
+    }
+    chain.block(6, Variables::log_exponent, groups(), groups()).setIdentity();
+    if (variables_.interpolation() >= 0) chain(lobe_.alpha, variables_.interpolation()) = 1;
+    if (variables_.log_excess_ior() >= 0) chain(lobe_.third, variables_.log_excess_ior()) = 1;
+    return chain;
+  }
+
+  int lobe_count() const { return lobe_.count; }
+
+ private:
+  const Variables& variables_;
+  const VectorXd& x_;
+  Parameters parameters_;
+  LobeVariables lobe_;
+};
+
+void add(KernelSums& total, const KernelSums& part) {
+  // KernelSums is doubles throughout, summed one by one.
+  static_assert(sizeof(KernelSums) % sizeof(double) == 0);
+  auto* to = reinterpret_cast<double*>(&total);
+  const auto* from = reinterpret_cast<const double*>(&part);
+  for (std::size_t i = 0; i < sizeof(KernelSums) / sizeof(double); ++i) to[i] += from[i];
+}
+
+}  // namespace
+
+Evaluation Objective::evaluate(const VectorXd& x, Curvature curvature) const {
+  const Assembly assembly(variables_, x);
+  const int groups = assembly.groups(), runs = static_cast<int>(samples_.runs.size());
+  std::vector<KernelSums> sums(static_cast<std::size_t>(runs * groups));
+  parallel_for(runs, threads_, [&](int r) {
+    for (int group = 0; group < groups; ++group) {
+      sums[static_cast<std::size_t>(r * groups + group)] =
+          run_kernel(assembly.input(samples_, samples_.runs[static_cast<std::size_t>(r)], group,
+                                    smoothing_, curvature),
+                     kernel_norm(norm_));
+    }
+  });
+  VectorXd gradient = VectorXd::Zero(assembly.lobe_count());
+  MatrixXd hessian = MatrixXd::Zero(assembly.lobe_count(), assembly.lobe_count());
+  Evaluation result;
+  for (int group = 0; group < groups; ++group) {
+    KernelSums total{};
+    for (int r = 0; r < runs; ++r) add(total, sums[static_cast<std::size_t>(r * groups + group)]);
+    result.value += total.value;
+    result.true_value += total.true_value;
+    assembly.add(total, group, gradient, hessian);
+  }
+  const MatrixXd full = hessian.selfadjointView<Eigen::Lower>();
+  const MatrixXd chain = assembly.chain();
+  result.gradient = chain.transpose() * gradient;
+  result.hessian = chain.transpose() * full * chain;
+  return result;
+}
+
+}  // namespace lobefit

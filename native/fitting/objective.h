@@ -1,0 +1,50 @@
+// The misfit of a model to samples, with its gradient and the matrix of reweighted squares.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "fitting/samples.h"
+#include "fitting/variables.h"
+
+namespace lobefit {
+
+// F = sum over samples, channels and both halves of weight * rho(r), r = model - measured, with
+//   rho(r) = 2 e^2 (sqrt(1 + r^2/e^2) - 1)   of the norms l1 and cosine_l1: about 2 e |r|,
+//   rho(r) = r^2                             of l2 and log_l2.
+// Matrix of J'WJ with W = rho'(r) / (2 r), which never overshoots and converges slowly, or with
+// W = rho''(r) / 2, Newton's, which is fast close to the minimum. They are the same for squares.
+enum class Curvature { reweighted, newton };
+
+struct Evaluation {
+  double value = 0;          // F
+  double true_value = 0;     // sum of weight |r| (without smoothing), or F for the square norms
+  Eigen::VectorXd gradient;  // J'Wr = dF/dx / 2, W = rho'(r) / (2 r)
+  Eigen::MatrixXd hessian;   // of the curvature asked for
+};
+
+class Objective {
+ public:
+  Objective(const Samples& samples, const Variables& variables, Norm norm, double smoothing,
+            int threads)
+      : samples_(samples),
+        variables_(variables),
+        norm_(norm),
+        smoothing_(smoothing),
+        threads_(threads) {}
+
+  // One pass over the samples; x within its bounds. The same bits for any number of threads,
+  // because each run is summed by itself and the runs in their order.
+  Evaluation evaluate(const Eigen::VectorXd& x, Curvature curvature = Curvature::reweighted) const;
+
+  const Variables& variables() const { return variables_; }
+  double smoothing() const { return smoothing_; }
+
+ private:
+  const Samples& samples_;
+  const Variables& variables_;
+  Norm norm_;
+  double smoothing_;
+  int threads_;
+};
+
+}  // namespace lobefit

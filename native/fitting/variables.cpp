@@ -1,0 +1,71 @@
+#include "fitting/variables.h"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace lobefit {
+namespace {
+
+// An exponent of 1e-4 is flat to .1 % over nearly all bins, one of 1e8 narrower than a hundredth of
+// the first bin; an index of 1.0001 reflects 2.5e-9 and one of 200 is a mirror: beyond these bounds
+// the data cannot tell.
+constexpr double min_exponent = 1e-4, max_exponent = 1e8;
+constexpr double min_excess_ior = 1e-4, max_excess_ior = 199;
+
+}  // namespace
+
+Variables::Variables(ModelKind kind, bool fresnel, bool separate_channels)
+    : kind_(kind), exponents_(separate_channels ? 3 : 1) {
+  int count = log_exponent + exponents_;
+  if (kind == ModelKind::interpolated) interpolation_ = count++;
+  if (fresnel) log_excess_ior_ = count++;
+  lower_ = Eigen::VectorXd::Zero(count);
+  upper_ = Eigen::VectorXd::Constant(count, std::numeric_limits<double>::max());
+  lower_.segment(log_exponent, exponents_).setConstant(std::log(min_exponent));
+  upper_.segment(log_exponent, exponents_).setConstant(std::log(max_exponent));
+  if (interpolation_ >= 0) upper_[interpolation_] = 1;
+  if (fresnel) {
+    lower_[log_excess_ior_] = std::log(min_excess_ior);
+    upper_[log_excess_ior_] = std::log(max_excess_ior);
+  }
+}
+
+Eigen::VectorXd Variables::clamp(const Eigen::VectorXd& x) const {
+  return x.cwiseMax(lower_).cwiseMin(upper_);
+}
+
+std::vector<int> Variables::all() const {
+  std::vector<int> indices(static_cast<std::size_t>(count()));
+  std::iota(indices.begin(), indices.end(), 0);
+  return indices;
+}
+
+std::vector<int> Variables::reflectances() const { return {0, 1, 2, 3, 4, 5}; }
+
+std::vector<int> Variables::shape() const {
+  std::vector<int> indices = all();
+  indices.erase(indices.begin(), indices.begin() + log_exponent);
+  return indices;
+}
+
+std::vector<int> Variables::shape_and_specular() const {
+  std::vector<int> indices = all();
+  indices.erase(indices.begin(), indices.begin() + specular);
+  return indices;
+}
+
+Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const {
+  Parameters parameters;
+  parameters.kind = kind_;
+  parameters.diffuse = x.segment<3>(diffuse).array() * (unit * pi);
+  parameters.specular = x.segment<3>(specular).array() * unit;
+  for (int c = 0; c < 3; ++c) {
+    parameters.exponent[c] = std::exp(x[log_exponent + (exponents_ == 3 ? c : 0)]);
+  }
+  if (interpolation_ >= 0) parameters.interpolation = x[interpolation_];
+  if (log_excess_ior_ >= 0) parameters.ior = 1 + std::exp(x[log_excess_ior_]);
+  return parameters;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,60 @@
+// A measured isotropic reflectance on the half-difference grid of the MERL database.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "measurement/half_difference.h"
+#include "measurement/vector3.h"
+
+namespace lobefit {
+
+// How many of the table's bins can be used, and why the others cannot. A bin is counted once, under
+// the first reason that holds: its centre lies below the horizon, a channel is not finite, a
+// channel is negative.
+struct BinCounts {
+  int valid = 0;
+  int below_horizon = 0;
+  int negative = 0;
+  int non_finite = 0;
+};
+
+// Reflectance f in 1/sr at the centres of 90 x 90 x 180 bins (Matusik et al. 2003):
+// theta_h = ((h + .5) / 90)^2 * 90 deg, theta_d = d + .5 deg, phi_d = p + .5 deg.
+class Measurement {
+ public:
+  static constexpr int theta_h_bins = 90;
+  static constexpr int theta_d_bins = 90;
+  static constexpr int phi_d_bins = 180;
+  static constexpr int bin_count = theta_h_bins * theta_d_bins * phi_d_bins;
+
+  // Takes three planes (red, green, blue) of bin_count values in 1/sr, phi_d running fastest, then
+  // theta_d. All three channels of every invalid bin become NaN.
+  explicit Measurement(std::vector<double> planes);
+
+  // The table of a reflectance given at half-difference angles; bins below the horizon are invalid.
+  static Measurement tabulate(const std::function<Rgb(const HalfDifference&)>& reflectance);
+
+  static int index(int h, int d, int p) { return p + phi_d_bins * (d + theta_d_bins * h); }
+  static HalfDifference centre(int h, int d, int p);
+
+  // The reflectance of a bin; NaN in all three channels where it is invalid.
+  Rgb bin(int h, int d, int p) const;
+  bool valid(int h, int d, int p) const;
+
+  // Reflectance between the bins, for unit vectors in the local frame (n = +z): trilinear in
+  // (sqrt theta_h, theta_d, phi_d) over the valid neighbours; NaN where these hold less than half
+  // of the weight, and below the horizon.
+  Rgb evaluate(const Vector3& wi, const Vector3& wo) const;
+
+  const BinCounts& bins() const { return bins_; }
+
+  // Three planes of bin_count values, NaN where invalid.
+  const std::vector<double>& planes() const { return planes_; }
+
+ private:
+  std::vector<double> planes_;
+  BinCounts bins_;
+};
+
+}  // namespace lobefit

@@ -1,0 +1,203 @@
+#include "measurement/merl.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "measurement/input_error.h"
+
+namespace lobefit {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "MERL files are read in place");
+
+constexpr std::array<double, 3> channel_scale = {1.0 / 1500, 1.15 / 1500, 1.66 / 1500};
+constexpr std::array<const char*, 3> dimension_name = {"theta_h", "theta_d", "phi_d"};
+using Dimensions = std::array<std::int32_t, 3>;
+constexpr Dimensions dimensions = {Measurement::theta_h_bins, Measurement::theta_d_bins,
+                                   Measurement::phi_d_bins};
+constexpr int double_phi_bins = 2 * Measurement::phi_d_bins;
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& why) {
+  throw InputError(path.string() + ": " + why);
+}
+
+std::string reason() { return std::strerror(errno); }
+
+// "34992012" -> "34,992,012", as a person reads it.
+std::string with_commas(std::uintmax_t number) {
+  std::string digits = std::to_string(number);
+  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3) {
+    digits.insert(static_cast<std::size_t>(at), 1, ',');
+  }
+  return digits;
+}
+
+std::uintmax_t bytes_of(const Dimensions& size) {
+  std::uintmax_t values = 3;
+  for (const std::int32_t n : size) values *= static_cast<std::uintmax_t>(n);
+  return sizeof(Dimensions) + values * sizeof(double);
+}
+
+bool has_merl_dimensions(const Dimensions& found) {
+  return found[0] == dimensions[0] && found[1] == dimensions[1] &&
+         (found[2] == dimensions[2] || found[2] == double_phi_bins);
+}
+
+std::int32_t byte_swapped(std::int32_t value) {
+  return static_cast<std::int32_t>(__builtin_bswap32(static_cast<std::uint32_t>(value)));
+}
+
+void check_dimensions(const std::filesystem::path& path, const Dimensions& found) {
+  if (has_merl_dimensions(found)) return;
+  const std::string expected = "expected a MERL table of 90 x 90 x 180 bins, found ";
+  Dimensions swapped = found;
+  for (std::int32_t& n : swapped) n = byte_swapped(n);
+  if (has_merl_dimensions(swapped)) {
+    fail(path, expected +
+                   "these dimensions in big-endian byte order; MERL files are "
+                   "little-endian, was it written on another kind of machine?");
+  }
+  std::string wrong;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (found[axis] == dimensions[axis]) continue;
+    wrong += (wrong.empty() ? "" : ", ") + std::string(dimension_name[axis]) + " = " +
+             std::to_string(found[axis]);
+  }
+  fail(path, expected + wrong + "; is this another format?");
+}
+
+File open_for_reading(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (status.type() == std::filesystem::file_type::not_found) {
+    fail(path, "expected a measured reflectance file, found no such file.");
+  }
+  if (std::filesystem::is_directory(status)) {
+    fail(path, "expected a measured reflectance file, found a folder.");
+  }
+  if (!error && !std::filesystem::is_regular_file(status)) {
+    fail(path, "expected a measured reflectance file, found something that is not a file.");
+  }
+  File file(std::fopen(path.c_str(), "rb"));
+  if (!file) fail(path, "expected a readable file, found: " + reason() + ".");
+  return file;
+}
+
+Dimensions read_dimensions(const std::filesystem::path& path, std::FILE* file,
+                           std::uintmax_t size) {
+  Dimensions found{};
+  if (size < sizeof(found)) {
+    fail(path, "expected a MERL table of " + with_commas(bytes_of(dimensions)) + " bytes, found " +
+                   (size == 0 ? "an empty file." : with_commas(size) + " bytes."));
+  }
+  if (std::fread(found.data(), sizeof(found), 1, file) != 1) {
+    fail(path, "expected three dimensions at its head, found: " + reason() + ".");
+  }
+  return found;
+}
+
+void check_size(const std::filesystem::path& path, std::uintmax_t expected, std::uintmax_t found) {
+  if (expected == found) return;
+  fail(path, "expected " + with_commas(expected) + " bytes, found " + with_commas(found) +
+                 (found < expected ? "; was the file cut off while it was copied?"
+                                   : "; there is something behind the table."));
+}
+
+void read_values(const std::filesystem::path& path, std::FILE* file, std::vector<double>& values) {
+  if (std::fread(values.data(), sizeof(double), values.size(), file) != values.size()) {
+    fail(path, "expected " + with_commas(values.size()) +
+                   " values, found fewer; did the file change while it was read?");
+  }
+}
+
+// The mean of two stored values, or the usable one of them.
+double merged(double first, double second) {
+  const auto usable = [](double v) { return std::isfinite(v) && v >= 0; };
+  if (usable(first) && usable(second)) return (first + second) / 2;
+  return usable(second) ? second : first;
+}
+
+// [..][360] -> [..][180]: phi_d and phi_d + 180 deg are the same bin by reciprocity.
+std::vector<double> fold_phi(const std::vector<double>& stored) {
+  std::vector<double> folded(stored.size() / 2);
+  for (std::size_t i = 0; i < folded.size(); ++i) {
+    const std::size_t row = i / Measurement::phi_d_bins, p = i % Measurement::phi_d_bins;
+    const double* values = stored.data() + row * double_phi_bins;
+    folded[i] = merged(values[p], values[p + Measurement::phi_d_bins]);
+  }
+  return folded;
+}
+
+}  // namespace
+
+Measurement read_merl(const std::filesystem::path& path) {
+  const File file = open_for_reading(path);
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) fail(path, "expected a readable file, found: " + error.message() + ".");
+  const Dimensions found = read_dimensions(path, file.get(), size);
+  check_dimensions(path, found);
+  check_size(path, bytes_of(found), size);
+  std::vector<double> values((size - sizeof(Dimensions)) / sizeof(double));
+  read_values(path, file.get(), values);
+  if (found[2] == double_phi_bins) values = fold_phi(values);
+  for (int channel = 0; channel < 3; ++channel) {
+    double* const plane = values.data() + channel * Measurement::bin_count;
+    std::transform(plane, plane + Measurement::bin_count, plane,
+                   [=](double stored) { return stored * channel_scale[channel]; });
+  }
+  Measurement measurement(std::move(values));
+  if (measurement.bins().valid == 0) {
+    const BinCounts& bins = measurement.bins();
+    fail(path, "expected reflectances, found no valid bin (" + with_commas(bins.negative) +
+                   " negative, " + with_commas(bins.non_finite) + " not finite, " +
+                   with_commas(bins.below_horizon) + " below the horizon).");
+  }
+  return measurement;
+}
+
+void write_merl(const Measurement& measurement, const std::filesystem::path& path) {
+  const std::filesystem::path aside = path.string() + ".part";
+  const auto give_up = [&](const std::string& why) {
+    std::error_code ignored;
+    std::filesystem::remove(aside, ignored);
+    fail(path, "expected to write a MERL table of " + with_commas(bytes_of(dimensions)) +
+                   " bytes, found: " + why + ".");
+  };
+  File file(std::fopen(aside.c_str(), "wb"));
+  if (!file) give_up(reason());
+  std::vector<double> stored = measurement.planes();
+  for (int channel = 0; channel < 3; ++channel) {
+    double* const plane = stored.data() + channel * Measurement::bin_count;
+    std::transform(plane, plane + Measurement::bin_count, plane, [=](double value) {
+      return std::isnan(value) ? -1.0 : value / channel_scale[channel];
+    });
+  }
+  const bool written =
+      std::fwrite(dimensions.data(), sizeof(dimensions), 1, file.get()) == 1 &&
+      std::fwrite(stored.data(), sizeof(double), stored.size(), file.get()) == stored.size() &&
+      std::fflush(file.get()) == 0;
+  if (!written) give_up(reason());
+  file.reset();
+  std::error_code error;
+  std::filesystem::rename(aside, path, error);
+  if (error) give_up(error.message());
+}
+
+}  // namespace lobefit

@@ -1,0 +1,26 @@
+"""Lobefit: measured reflectance as one modified Phong lobe, with the error stated.
+
+    import lobefit
+    record = lobefit.fit("nickel.binary")      # the interpolated lobe of Nielsen et al., eq. 3
+    print(record.parameters, record.error["relative_l1"]["pooled"])
+    record.save("nickel.json")
+
+Nothing here needs Blender; materials are built from a record by the package `lobefit_addon`.
+"""
+
+from lobefit._native import Cancelled, InputError, Measurement
+from lobefit._native import version as __version__
+from lobefit.fitting import Job, fit, read, start_fit
+from lobefit.record import Record
+
+__all__ = [
+    "Cancelled",
+    "InputError",
+    "Job",
+    "Measurement",
+    "Record",
+    "__version__",
+    "fit",
+    "read",
+    "start_fit",
+]

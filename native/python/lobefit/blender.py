@@ -1,0 +1,88 @@
+"""The few calls that need Blender; nothing of it is imported before one of them is made."""
+
+import importlib.util
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobefit._native import InputError
+from lobefit.atomic import written_aside
+from lobefit.record import Record
+
+KINDS = ("live", "principled")
+
+
+def need_blender() -> None:
+    """Raises InputError, with what to install, where Blender's Python module is missing."""
+    for module in ("bpy", "lobefit_addon"):
+        if importlib.util.find_spec(module) is None:
+            raise InputError(
+                f"expected the Python module {module} to make a material, found none; install it "
+                "with: pip install 'lobefit[blender]'."
+            )
+
+
+def write_blend(path: str | os.PathLike[str], record: Record, kind: str = "live") -> None:
+    """Writes a Blender file with the material of a record on a sphere under two lights."""
+    _two_lights_scene([record], kind, 512)
+    _save(path)
+
+
+def write_library(path: str | os.PathLike[str], records: list[Record]) -> None:
+    """Writes a Blender file with the materials of all records, the first of them on a sphere."""
+    _two_lights_scene(records, "live", 512)
+    _save(path)
+
+
+def render(record: Record, size: int) -> NDArray[np.float32]:
+    """The radiance (size, size, 3) that Cycles gives a record's material under the two lights."""
+    from lobefit_addon.scene import render_pixels
+
+    scene = _two_lights_scene([record], "live", size)
+    with _quiet():
+        pixels: NDArray[np.float32] = render_pixels(scene)
+    return pixels
+
+
+def _two_lights_scene(records: list[Record], kind: str, size: int) -> Any:
+    """An otherwise empty Blender with the materials; the scene shows the first, `size` pixels."""
+    import bpy
+    from lobefit_addon import build_material
+    from lobefit_addon.scene import two_lights_scene
+
+    with _quiet():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        materials = [build_material(record, kind=kind, name=record.name) for record in records]
+        for material in materials:
+            material.use_fake_user = True
+        return two_lights_scene(materials[0], size)
+
+
+def _save(path: str | os.PathLike[str]) -> None:
+    import bpy
+
+    with written_aside(path) as aside, _quiet():
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(aside.absolute()), copy=True, compress=True)
+        except RuntimeError as error:
+            raise InputError(f"{path}: cannot be written, {str(error).strip()}.") from error
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps what Blender itself prints out of our results on stdout."""
+    sys.stdout.flush()
+    ours = os.dup(1)
+    try:
+        with Path(os.devnull).open("w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        os.dup2(ours, 1)
+        os.close(ours)

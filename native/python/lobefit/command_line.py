@@ -1,0 +1,322 @@
+"""The command line: `lobefit COMMAND`, a thin layer over the Python interface.
+
+Exit codes: 0 done; 1 some of several inputs failed, each named, the others done; 2 wrong use or an
+unreadable input; 130 interrupted. Results go to stdout, messages and the progress bar to stderr.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+from lobefit import _native, blender, picture, preview, report
+from lobefit._native import Cancelled, InputError
+from lobefit.atomic import make_folder, place_to_write
+from lobefit.fitting import read
+from lobefit.inputs import MEASUREMENT_SUFFIXES, RECORD_SUFFIX, Progress, record_of, spread
+from lobefit.origin import origin_of, write_samples
+from lobefit.record import MODELS, VISUAL_NORM, Record
+
+DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
+
+_BAR = 24  # characters
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs one command and returns its exit code; never a traceback for what a user may do."""
+    try:
+        options = _parser().parse_args(arguments)
+        code: int = options.run(options)
+        return code
+    except InputError as error:
+        return _complain(error)
+    except (KeyboardInterrupt, Cancelled):
+        print("lobefit: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our results has gone; what Python still flushes at its end goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except MemoryError:
+        return _complain("expected enough memory, found too little.")
+
+
+def _complain(problem: object) -> int:
+    print(f"lobefit: {problem}", file=sys.stderr)
+    return WRONG
+
+
+def for_each(paths: Iterable[Path], work: Callable[[Path], None]) -> int:
+    """Does `work` for every path, names those that fail on stderr, and returns the exit code."""
+    places, failed = list(paths), 0
+    for path in places:
+        try:
+            work(path)
+        except InputError as error:
+            failed += 1
+            _complain(error)
+    if failed == 0:
+        return DONE
+    return SOME_FAILED if len(places) > 1 else WRONG
+
+
+@contextmanager
+def progress_bar(name: str) -> Iterator[Progress | None]:
+    """A bar on stderr while the block runs; None where stderr is no terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+
+    def show(share: float, stage: str) -> None:
+        full = round(share * _BAR)
+        bar = "#" * full + "-" * (_BAR - full)
+        sys.stderr.write(f"\r\033[K{name} [{bar}] {share:4.0%} {stage}")
+        sys.stderr.flush()
+
+    try:
+        yield show
+    finally:
+        sys.stderr.write("\r\033[K")
+        sys.stderr.flush()
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says in one sentence what is wrong with a command line, without the usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see {self.prog} --help.")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="lobefit", description="Measured materials as Cycles node groups.")
+    parser.add_argument("--version", action="version", version=f"lobefit {_native.version}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    for add in (_add_sample, _add_info, _add_fit, _add_preview, _add_material, _add_report):
+        add(commands)
+    return parser
+
+
+def _add(commands: Any, run: Callable[[argparse.Namespace], int], text: str) -> Any:
+    """A command named as the function that runs it."""
+    name = run.__name__.removeprefix("_")
+    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+    command.set_defaults(run=run)
+    return command
+
+
+def _add_json(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--json", action="store_true", help="print one line of JSON a result")
+
+
+def _add_sample(commands: Any) -> None:
+    command = _add(commands, _sample, "write sample measurements made from published figures")
+    command.add_argument("folder", metavar="DIR")
+    command.add_argument("names", metavar="NAME", nargs="*", help="all when none is given")
+    _add_json(command)
+
+
+def _add_info(commands: Any) -> None:
+    command = _add(commands, _info, "say what measured files hold")
+    command.add_argument("files", metavar="FILE", nargs="+")
+    _add_json(command)
+
+
+def _add_fit(commands: Any) -> None:
+    command = _add(commands, _fit, "fit a model to measured files")
+    command.add_argument("files", metavar="FILE", nargs="+", help="measured files, or folders")
+    _add_fit_options(command, model="interpolated", norm="l1")
+    command.add_argument(
+        "-o", dest="output", required=True, help="RECORD.json, or a folder for several files"
+    )
+    _add_json(command)
+
+
+def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) -> None:
+    group = command.add_argument_group("fit of a measured file")
+    group.add_argument("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
+    group.add_argument("--no-fresnel", dest="fresnel", action="store_false")
+    group.add_argument("--schedule", choices=("stages", "polish"), default="polish", help=_DEFAULT)
+    group.add_argument(
+        "--norm", choices=("l1", "cosine-l1", "l2", "log-l2"), default=norm, help=_DEFAULT
+    )
+    group.add_argument(
+        "--max-angle",
+        type=_within(float, 1, 90, "degrees"),
+        default=90.0,
+        metavar="DEG",
+        help="leave out beyond; " + _DEFAULT,
+    )
+    group.add_argument(
+        "--channels", choices=("shared", "separate"), default="shared", help=_DEFAULT
+    )
+    group.add_argument(
+        "--threads",
+        type=_within(int, 0, 1024, "a number"),
+        default=0,
+        metavar="N",
+        help="0: every processor",
+    )
+
+
+_DEFAULT = "default: %(default)s"
+
+
+def _add_preview(commands: Any) -> None:
+    command = _add(commands, _preview, "draw measurement and fits as spheres under two lights")
+    command.add_argument("files", metavar="FILE|RECORD.json", nargs="+")
+    _add_fit_options(command, model="all", norm=VISUAL_NORM)
+    command.add_argument(
+        "--size",
+        type=_within(int, 16, 2048, "pixels"),
+        default=preview.SPHERE,
+        help="pixels a sphere; " + _DEFAULT,
+    )
+    command.add_argument("-o", dest="output", required=True, metavar="PICTURE.png")
+
+
+def _add_material(commands: Any) -> None:
+    command = _add(commands, _material, "make a Blender file with the material (needs bpy)")
+    command.add_argument("file", metavar="FILE|RECORD.json")
+    command.add_argument("--kind", choices=blender.KINDS, default="live", help=_DEFAULT)
+    _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
+    command.add_argument("-o", dest="output", required=True, metavar="OUT.blend")
+
+
+def _add_report(commands: Any) -> None:
+    command = _add(commands, _report, "write a page of pictures, errors and run times")
+    command.add_argument("files", metavar="FILE|RECORD.json|DIR", nargs="+")
+    _add_fit_options(command, model="all", norm=VISUAL_NORM)
+    command.add_argument("-o", dest="output", required=True, metavar="DIR")
+
+
+def _within(kind: type, low: float, high: float, what: str) -> Callable[[str], Any]:
+    """A reader of numbers from low to high for argparse."""
+
+    def read_number(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"expected {what} from {low} to {high}, found {text!r}"
+            )
+        return value
+
+    return read_number
+
+
+def _sample(options: argparse.Namespace) -> int:
+    known = _native.sample_names()
+    for name in options.names:
+        if name not in known:
+            raise InputError(f"{name}: expected one of {', '.join(known)}.")
+    for path in write_samples(options.folder, options.names or known):
+        result = {"path": str(path), "name": origin_of(path).name}
+        print(json.dumps(result) if options.json else f"{path}: {result['name']}")
+    return DONE
+
+
+def _info(options: argparse.Namespace) -> int:
+    def tell(path: Path) -> None:
+        measurement = read(path)
+        bins, origin = dict(measurement.bins), origin_of(path)
+        warnings = _bin_warnings(bins)
+        if options.json:
+            facts = origin.entries() | {"format": measurement.format, "bytes": path.stat().st_size}
+            print(json.dumps(facts | {"bins": bins, "warnings": warnings}))
+            return
+        named = f", {origin.name}" if origin.name else ""
+        size = f"{path.stat().st_size:,} bytes"
+        print(f"{path}: {measurement.format}{named}, {size}, {bins['valid']:,} valid bins")
+        print(f"  rejected: {bins['below_horizon']:,} below the horizon, ", end="")
+        print(f"{bins['negative']:,} negative, {bins['non_finite']:,} not finite")
+        for warning in warnings:
+            print(f"  warning: {warning}")
+
+    return for_each(map(Path, options.files), tell)
+
+
+def _bin_warnings(bins: dict[str, int]) -> list[str]:
+    """What a user should know of bins that are damaged and not merely below the horizon."""
+    above = sum(bins.values()) - bins["below_horizon"]
+    kinds = {"negative": "have a negative channel", "non_finite": "have a channel without a number"}
+    return [
+        f"{bins[kind] / above:.1%} of the bins above the horizon {what}"
+        for kind, what in kinds.items()
+        if bins[kind]
+    ]
+
+
+def _fit(options: argparse.Namespace) -> int:
+    output = Path(options.output)
+    one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
+    paths = spread(options.files, MEASUREMENT_SUFFIXES)
+    if not one:
+        make_folder(output)
+
+    def fit_one(path: Path) -> None:
+        place = output if one else output / f"{path.stem}{RECORD_SUFFIX}"
+        place_to_write(place)
+        record = _record(path, options)
+        record.save(place)
+        _print_fit(record, place, options.json)
+
+    return for_each(paths, fit_one)
+
+
+def _record(path: Path, options: argparse.Namespace) -> Record:
+    names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
+    with progress_bar(path.name) as progress:
+        return record_of(path, progress, **{name: getattr(options, name) for name in names})
+
+
+def _print_fit(record: Record, place: Path, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"record": str(place)} | json.loads(record.to_json())))
+        return
+    print(f"{place}: {record.name}")
+    for model, fit in record.fits.items():
+        error = fit.error[record.leading_figure]["pooled"]
+        figure = preview.FIGURES[record.leading_figure]
+        mark = "*" if record.models and model == record.model else " "
+        print(f" {mark} {model:20} {figure} {error:.4f}, {fit.seconds['total']:.2f} s")
+    for warning in record.warnings:
+        print(f"   warning: {warning}")
+
+
+def _records(options: argparse.Namespace, records: list[Record]) -> int:
+    """Collects in `records` what the files of a command line stand for."""
+    paths = spread(options.files, (RECORD_SUFFIX,))
+    return for_each(paths, lambda path: records.append(_record(path, options)))
+
+
+def _preview(options: argparse.Namespace) -> int:
+    place_to_write(options.output)
+    records: list[Record] = []
+    code = _records(options, records)
+    if records:
+        size = options.size
+        rows = [preview.row(record, preview.measurement_of(record), size) for record in records]
+        picture.write_png(options.output, preview.sheet(rows, size))
+    return code
+
+
+def _material(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    place_to_write(options.output)
+    blender.write_blend(options.output, _record(Path(options.file), options), options.kind)
+    return DONE
+
+
+def _report(options: argparse.Namespace) -> int:
+    records: list[Record] = []
+    code = _records(options, records)
+    if records:
+        report.write(options.output, records)
+        print(Path(options.output) / "index.html")
+    return code

@@ -1,0 +1,84 @@
+"""Where a measurement comes from: its file, and for a sample what it was made from."""
+
+import csv
+import hashlib
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lobefit import _native
+from lobefit._native import InputError
+from lobefit.atomic import make_folder, reason, write_bytes
+
+_LIST = "samples.csv"
+_COLUMNS = ("sha256", "file", "name", "source")
+_PAPER = (
+    "ABC fit published by Low, Kronander, Ynnerman and Unger, BRDF Models for Accurate and "
+    "Efficient Rendering of Glossy Surfaces, TOG 2012"
+)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A file by its path and the hash of its bytes, with the honest name of a sample."""
+
+    path: str | None = None
+    sha256: str | None = None
+    name: str | None = None
+
+    def entries(self) -> dict[str, Any]:
+        """The part of a record's `source` that tells the origin."""
+        named = {"name": self.name} if self.name else {}
+        return {"path": self.path, "sha256": self.sha256} | named
+
+
+def origin_of(path: str | os.PathLike[str]) -> Origin:
+    """The origin of the file `path`; it has a name if a list of samples beside it has its hash."""
+    place = Path(os.path.abspath(path))
+    try:
+        with place.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
+    return Origin(str(place), digest, _listed(place.parent).get(digest, {}).get("name"))
+
+
+def write_samples(folder: str | os.PathLike[str], names: list[str]) -> list[Path]:
+    """Writes samples in MERL layout and the list that says what they are; returns their paths."""
+    place = make_folder(folder)
+    paths = []
+    for name in names:
+        paths.append(place / f"{name}.binary")
+        _native.sample(name).write(str(paths[-1]))
+    _write_list(place, paths)
+    return paths
+
+
+def sample_title(name: str) -> str:
+    """What to call the sample `name`: it is no measurement, and must not pass for one."""
+    return f"{name} (from Low et al.'s ABC fit)"
+
+
+def _write_list(folder: Path, paths: list[Path]) -> None:
+    """Adds the samples to the folder's list; those written earlier stay in it."""
+    rows = _listed(folder)
+    for path in paths:
+        digest = origin_of(path).sha256 or ""
+        values = (digest, path.name, sample_title(path.stem), _PAPER)
+        rows[digest] = dict(zip(_COLUMNS, values, strict=True))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n", extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(rows.values())
+    write_bytes(folder / _LIST, text.getvalue().encode())
+
+
+def _listed(folder: Path) -> dict[str, dict[str, str]]:
+    """The folder's list of samples by their hash; where there is none, or a damaged one, empty."""
+    try:
+        rows = list(csv.DictReader(io.StringIO((folder / _LIST).read_text())))
+        return {row["sha256"]: row for row in rows if row["name"]}
+    except (OSError, ValueError, KeyError, csv.Error):
+        return {}

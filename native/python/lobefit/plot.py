@@ -1,0 +1,103 @@
+"""Line plots as inline SVG, as much of a plotting library as the report needs."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+_WIDTH, _HEIGHT = 460, 250
+_LEFT, _RIGHT, _TOP, _BOTTOM = 58, 14, 14, 44
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve; a point with a missing (None) y parts it."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float | None]
+    color: str
+    dashed: bool = False
+    dots: Sequence[str] = ()  # what each point is, shown when it is pointed at
+
+
+def plot(lines: Sequence[Line], x_title: str, y_title: str) -> str:
+    """The lines over common linear axes from 0, as an SVG element."""
+    known = [(x, y) for line in lines for x, y in zip(line.x, line.y, strict=True) if y is not None]
+    if not known:
+        return ""
+    last = max(x for x, _ in known)
+    x_ticks = [tick for tick in _ticks(last) if tick <= last]
+    axes = _Axes(last, x_ticks, _ticks(max(y for _, y in known)))
+    parts = [
+        f'<svg class="plot" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" '
+        f'aria-label="{escape(y_title)} over {escape(x_title)}">',
+        axes.grid(),
+        f'<text x="{(_LEFT + _WIDTH - _RIGHT) / 2}" y="{_HEIGHT - 6}" class="middle">'
+        f"{escape(x_title)}</text>",
+        f'<text transform="translate(13 {(_TOP + _HEIGHT - _BOTTOM) / 2}) rotate(-90)" '
+        f'class="middle">{escape(y_title)}</text>',
+    ]
+    return "".join(parts + [axes.curve(line) for line in lines]) + "</svg>"
+
+
+def legend(lines: Sequence[Line]) -> str:
+    """The labels of the lines beside a piece of each."""
+    keys = (
+        f'<span><svg width="26" height="10"><line x1="1" y1="5" x2="25" y2="5" '
+        f'stroke="{line.color}" stroke-width="2"{_dashes(line)}/></svg>{escape(line.label)}</span>'
+        for line in lines
+    )
+    return f'<p class="legend">{"".join(keys)}</p>'
+
+
+class _Axes:
+    def __init__(self, last: float, x_ticks: list[float], y_ticks: list[float]) -> None:
+        self._last, self._x, self._y = last, x_ticks, y_ticks
+
+    def _place(self, x: float, y: float) -> tuple[float, float]:
+        across, up = x / (self._last or 1.0), y / self._y[-1]
+        return (
+            _LEFT + across * (_WIDTH - _LEFT - _RIGHT),
+            _HEIGHT - _BOTTOM - up * (_HEIGHT - _TOP - _BOTTOM),
+        )
+
+    def grid(self) -> str:
+        parts = []
+        for tick in self._y:
+            x, y = self._place(self._x[0], tick)
+            parts.append(f'<path class="grid" d="M{x:.1f} {y:.1f}H{_WIDTH - _RIGHT}"/>')
+            parts.append(f'<text x="{x - 6:.1f}" y="{y + 4:.1f}" class="end">{tick:g}</text>')
+        for tick in self._x:
+            x, y = self._place(tick, self._y[0])
+            parts.append(f'<text x="{x:.1f}" y="{y + 16:.1f}" class="middle">{tick:g}</text>')
+        return "".join(parts)
+
+    def curve(self, line: Line) -> str:
+        path, pen_down, dots = [], False, []
+        for index, (x, y) in enumerate(zip(line.x, line.y, strict=True)):
+            if y is None:
+                pen_down = False
+                continue
+            at = self._place(x, y)
+            path.append(f"{'L' if pen_down else 'M'}{at[0]:.1f} {at[1]:.1f}")
+            pen_down = True
+            if line.dots:
+                dots.append(
+                    f'<circle cx="{at[0]:.1f}" cy="{at[1]:.1f}" r="3.5" fill="{line.color}">'
+                    f"<title>{escape(line.dots[index])}</title></circle>"
+                )
+        stroke = f'stroke="{line.color}"{_dashes(line)}'
+        return f'<path class="curve" d="{"".join(path)}" {stroke}/>' + "".join(dots)
+
+
+def _dashes(line: Line) -> str:
+    return ' stroke-dasharray="5 4"' if line.dashed else ""
+
+
+def _ticks(high: float) -> list[float]:
+    """Some five round numbers from 0 whose last is at least `high`."""
+    high = max(high, 1e-12)
+    power = 10.0 ** math.floor(math.log10(high / 4))
+    step = next(factor for factor in (1, 2, 2.5, 5, 10) if factor * power * 5 >= high) * power
+    return [round(index * step, 12) for index in range(math.ceil(high / step) + 1)]

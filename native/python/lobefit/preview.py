@@ -1,0 +1,142 @@
+"""Figure 1 of Nielsen et al. for any material: measurement and fits under two lights."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobefit import _native, lettering, picture
+from lobefit._native import Measurement
+from lobefit.picture import Image
+from lobefit.record import Record
+
+AMPLIFIED = 4
+SPHERE = 180  # pixels a sphere, if nothing else is asked for
+FINER = 3  # spheres are drawn this many times finer and then shrunk
+TITLES = {
+    "measured": "measured",
+    "modified-phong": "modified Phong",
+    "modified-blinn-phong": "modified Blinn-Phong",
+    "interpolated": "interpolated",
+    "cycles": "as Cycles will show it",
+    "rendered": "rendered by Cycles",
+    "difference": f"difference x{AMPLIFIED}",
+}
+FIGURES = {"relative_l1": "relative L1", "relative_l1_cosine": "cosine-weighted L1"}
+
+_PAPER = (0.115, 0.115, 0.125)
+_INK = (0.95, 0.95, 0.95)
+_FAINT = (0.62, 0.63, 0.66)
+_MARGIN, _GAP, _CAPTION, _HEADER = 28, 18, 30, 56
+_TEXT, _SMALL = 17.0, 15.0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A sphere as an sRGB image, and the line to letter under it."""
+
+    image: Image
+    caption: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """The panels of one material by their column, a key of `TITLES`."""
+
+    name: str
+    panels: dict[str, Panel]
+
+
+def measurement_of(record: Record) -> Measurement | None:
+    """The measurement a record was fitted to, or None where its file is no longer there."""
+    path = record.source["path"]
+    return Measurement.read(path) if path and Path(path).is_file() else None
+
+
+def row(
+    record: Record,
+    measurement: Measurement | None,
+    size: int = SPHERE,
+    rendered: NDArray[np.float32] | None = None,
+) -> Row:
+    """The spheres of a record, all at the exposure that suits the first of them.
+
+    `rendered` is the radiance that Cycles itself gave, FINER * size pixels wide.
+    """
+    linear = {"measured": _native.preview(measurement, size * FINER)} if measurement else {}
+    for model, fit in record.fits.items():
+        linear[model] = _native.preview(fit.parameters, size * FINER)
+    linear["cycles"] = _native.preview(("live", record.parameters), size * FINER)
+    figure = record.leading_figure
+    captions = {
+        model: f"{FIGURES[figure]} {fit.error[figure]['pooled']:.3f}"
+        for model, fit in record.fits.items()
+    }
+    captions["cycles"] = f"from {TITLES[record.model]}"
+    if rendered is not None:
+        linear["rendered"] = rendered
+        captions["rendered"] = f"{_apart(rendered, linear['cycles']):.4f} from the former"
+    if measurement:
+        linear["difference"] = AMPLIFIED * np.abs(linear["cycles"] - linear["measured"])
+        captions["difference"] = f"{_apart(linear['cycles'], linear['measured']):.3f} of the light"
+    white = picture.white_point(next(iter(linear.values())))
+    return Row(
+        record.name,
+        {
+            column: Panel(_sphere(image, white), captions.get(column, ""))
+            for column, image in linear.items()
+        },
+    )
+
+
+def sheet(rows: list[Row], size: int = SPHERE) -> Image:
+    """The rows under each other, with titles over the columns and names at the left."""
+    columns = [title for title in TITLES if any(title in row.panels for row in rows)]
+    names = [_lines(row.name) for row in rows]
+    beside = max(lettering.width(line, _TEXT) for lines in names for line in lines)
+    left = int(_MARGIN + beside + _GAP)
+    captions = [panel.caption for row in rows for panel in row.panels.values()]
+    lettered = [lettering.width(TITLES[title], _TEXT) for title in columns]
+    lettered += [lettering.width(caption, _SMALL) for caption in captions]
+    wide = max(size, int(max(lettered)))
+    step = wide + _GAP
+    image = picture.page(
+        _HEADER + len(rows) * (size + _CAPTION + _GAP) + _MARGIN - _GAP,
+        left + len(columns) * step - _GAP + _MARGIN,
+        _PAPER,
+    )
+    for index, title in enumerate(columns):
+        middle = left + index * step + wide / 2
+        lettering.draw(image, TITLES[title], middle, _HEADER - 18, _TEXT, _INK, "center")
+    for index, (material, lines) in enumerate(zip(rows, names, strict=True)):
+        top = _HEADER + index * (size + _CAPTION + _GAP)
+        _letter_name(image, lines, left - _GAP, top + size / 2)
+        for title, panel in material.panels.items():
+            corner = left + columns.index(title) * step + (wide - size) // 2
+            picture.paste(image, panel.image, top, corner, picture.disc(size))
+            middle = corner + size / 2
+            lettering.draw(image, panel.caption, middle, top + size + 21, _SMALL, _FAINT, "center")
+    return image
+
+
+def _sphere(linear: NDArray[np.float32], white: float) -> Image:
+    return picture.encode(picture.shrink(picture.expose(linear, white), FINER))
+
+
+def _apart(image: NDArray[np.float32], reference: NDArray[np.float32]) -> float:
+    """The sum of all differences against the light of the reference, where both are known."""
+    return float(np.nansum(np.abs(image - reference)) / np.nansum(reference).clip(1e-30))
+
+
+def _lines(name: str) -> list[str]:
+    """A name in two lines where it says in brackets what the material was made from."""
+    head, bracket, tail = name.partition(" (")
+    return [head, bracket.strip() + tail] if bracket else [head]
+
+
+def _letter_name(image: Image, lines: list[str], right: float, middle: float) -> None:
+    for index, (line, color) in enumerate(zip(lines, (_INK, _FAINT), strict=False)):
+        baseline = middle + 6 + (index - (len(lines) - 1) / 2) * 24
+        size = _TEXT if index == 0 else _SMALL
+        lettering.draw(image, line, right, baseline, size, color, "right")

@@ -1,0 +1,350 @@
+"""The record: one JSON file that holds all a fit found out, and all that a material needs."""
+
+import dataclasses
+import json
+import math
+import os
+import platform
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lobefit import _native
+from lobefit._native import InputError
+from lobefit.atomic import reason, write_bytes
+
+SCHEMA = 1
+MODELS = ("modified-phong", "modified-blinn-phong", "interpolated")
+ERRORS = ("l1", "relative_l1", "relative_l1_80", "relative_l1_cosine")
+
+# The norm of fits that are made to be looked at: plain L1 is the paper's, but bins near grazing,
+# of which a picture shows little, rule it.
+VISUAL_NORM = "cosine-l1"
+
+
+def figure_of(norm: str) -> str:
+    """The error figure, one of `ERRORS`, by which fits with this norm are compared."""
+    return "relative_l1_cosine" if norm == VISUAL_NORM else "relative_l1"
+
+
+@dataclass(kw_only=True)
+class Fit:
+    """One model fitted to one measurement.
+
+    `parameters` holds `model`, `diffuse` [3], `specular` [3] (rho_s of eq. 1 and 2, k_s of eq. 3 of
+    Nielsen et al.), `exponent` (one number, or three with separate channels), `interpolation`
+    (None but for eq. 3) and `ior` (None without Fresnel). `error` has the figures of `ERRORS`, each
+    with `pooled` and `rgb`. `stages` are {name, l1, seconds, iterations} in the order they ran.
+    """
+
+    model: str
+    parameters: dict[str, Any]
+    error: dict[str, dict[str, Any]]
+    stages: list[dict[str, Any]]
+    seconds: dict[str, float]
+    converged: bool
+    certainty: dict[str, Any]
+    albedo: dict[str, list[Any]]
+    warnings: list[str]
+    principled: dict[str, Any]
+
+
+@dataclass(kw_only=True)
+class Record(Fit):
+    """RECORD.json, schema 1.
+
+    `source` is {path, sha256, format, bins} with the `name` of a sample where the file is one; path
+    and sha256 are None for a measurement that was never a file. `models` holds a fit for each model
+    when several were fitted; the record's own model is then the one with the least error.
+    """
+
+    source: dict[str, Any]
+    schedule: str
+    norm: str
+    channels: str
+    max_angle: float
+    machine: dict[str, Any] = field(default_factory=lambda: this_machine())
+    models: dict[str, Fit] = field(default_factory=dict)
+    schema: int = SCHEMA
+
+    @property
+    def name(self) -> str:
+        """What to call the material in a picture or a report."""
+        path = self.source["path"]
+        return self.source.get("name") or (Path(path).stem if path else "measurement")
+
+    @property
+    def fits(self) -> dict[str, Fit]:
+        """Every fit in this record by its model, in the order of `MODELS`."""
+        fits = self.models or {self.model: self}
+        return {model: fits[model] for model in MODELS if model in fits}
+
+    @property
+    def leading_figure(self) -> str:
+        """The error figure, one of `ERRORS`, by which this record's fits are compared."""
+        return figure_of(self.norm)
+
+    def command(self) -> str:
+        """The command line that makes this record again."""
+        path = Path(self.source["path"] or "MEASUREMENT.binary")
+        words = ["lobefit", "fit", str(path), "--model", "all" if self.models else self.model]
+        words += ["--no-fresnel"] if self.parameters["ior"] is None else []
+        words += ["--schedule", self.schedule, "--norm", self.norm, "--channels", self.channels]
+        words += ["--max-angle", f"{self.max_angle:g}", "-o", f"{path.stem}.json"]
+        return shlex.join(words)
+
+    def to_json(self) -> str:
+        """The record as JSON; every number is exact when read back."""
+        return json.dumps(dataclasses.asdict(self), indent=1, allow_nan=False) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str | bytes, name: str = "record") -> "Record":
+        """The record in `text`. Raises InputError with `name`, what was expected and found."""
+        try:
+            data = json.loads(text, parse_constant=_refuse_constant)
+        except UnicodeDecodeError as error:
+            raise InputError(f"{name}: expected a record in UTF-8, found other bytes.") from error
+        except RecursionError as error:
+            raise InputError(f"{name}: expected a record, found JSON nested too deeply.") from error
+        except ValueError as error:
+            raise InputError(f"{name}: expected a record in JSON, found {error}.") from error
+        try:
+            _check_schema(data)
+            _RECORD(data, "")
+        except _Mismatch as mismatch:
+            raise InputError(f"{name}: {mismatch}.") from None
+        known = {key: data[key] for key in _names(cls) if key in data}
+        known["models"] = {
+            model: Fit(**{key: fit[key] for key in _names(Fit)})
+            for model, fit in data.get("models", {}).items()
+        }
+        return cls(**known)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the record to `path`, all of it or nothing."""
+        write_bytes(path, self.to_json().encode())
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> "Record":
+        """The record in the file `path`. Raises InputError where it cannot be read."""
+        try:
+            text = Path(path).read_bytes()
+        except IsADirectoryError:
+            raise InputError(f"{path}: expected a record, found a folder.") from None
+        except FileNotFoundError:
+            raise InputError(f"{path}: expected a record, found no such file.") from None
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
+        return cls.from_json(text, str(path))
+
+
+def this_machine() -> dict[str, Any]:
+    """What the run time of a fit depends on, and the build that did it."""
+    return {
+        "system": platform.platform(terse=True),
+        "processor": _processor(),
+        "threads": os.cpu_count() or 1,
+        "version": _native.version,
+        "build": _native.build_id,
+    }
+
+
+def _processor() -> str:
+    """The processor's name as the system tells it; Python itself knows it on some systems only."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return named[0] if named else platform.processor() or platform.machine()
+
+
+def _names(kind: type) -> list[str]:
+    return [item.name for item in dataclasses.fields(kind)]
+
+
+def without_nan(value: Any) -> Any:
+    """`value` with None for an unknown number (an albedo never measured): JSON has no NaN."""
+    if isinstance(value, dict):
+        return {key: without_nan(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# What a record looks like: each check takes a value and where it stands, and raises _Mismatch.
+
+_Check = Callable[[Any, str], None]
+
+
+class _Mismatch(Exception):
+    def __init__(self, where: str, expected: str, found: Any) -> None:
+        shown = found if isinstance(found, _Missing) else json.dumps(found)
+        shown = f"{str(shown)[:40]}..." if len(str(shown)) > 43 else str(shown)
+        super().__init__(f"expected {where or 'the record'} to be {expected}, found {shown}")
+
+
+class _Missing:
+    def __str__(self) -> str:
+        return "nothing"
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"the constant {name}, which JSON does not have")
+
+
+def _kind(expected: str, accepts: Callable[[Any], bool]) -> _Check:
+    def check(value: Any, where: str) -> None:
+        if not accepts(value):
+            raise _Mismatch(where, expected, value)
+
+    return check
+
+
+def _is_number(value: Any) -> bool:
+    # The comparison also holds for integers that are too large for a float.
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e308
+
+
+def _number(low: float, high: float = math.inf, note: str = "a number") -> _Check:
+    return _kind(note, lambda value: _is_number(value) and low <= value <= high)
+
+
+def _choice(*names: str) -> _Check:
+    return _kind(f"one of {', '.join(names)}", lambda value: value in names)
+
+
+def _or_null(check: _Check) -> _Check:
+    def checked(value: Any, where: str) -> None:
+        if value is not None:
+            check(value, where)
+
+    return checked
+
+
+def _list(item: _Check, length: int | None = None) -> _Check:
+    expected = "a list" if length is None else f"a list of {length}"
+
+    def check(value: Any, where: str) -> None:
+        if not isinstance(value, list) or length not in (None, len(value)):
+            raise _Mismatch(where, expected, value)
+        for index, entry in enumerate(value):
+            item(entry, f"{where}[{index}]")
+
+    return check
+
+
+def _object(required: dict[str, _Check], optional: dict[str, _Check] | None = None) -> _Check:
+    """An object with these keys; keys of a later version are no error."""
+
+    def check(value: Any, where: str) -> None:
+        if not isinstance(value, dict):
+            raise _Mismatch(where, "an object", value)
+        for key, item in (required | (optional or {})).items():
+            if key in value or key in required:
+                item(value.get(key, _Missing()), f"{where}.{key}" if where else key)
+
+    return check
+
+
+def _check_schema(data: Any) -> None:
+    if not isinstance(data, dict):
+        raise _Mismatch("", "an object", data)
+    if data.get("schema", _Missing()) != SCHEMA:
+        raise _Mismatch("schema", f"{SCHEMA}", data.get("schema", _Missing()))
+
+
+def _exponent(value: Any, where: str) -> None:
+    if isinstance(value, list):
+        _list(_AMOUNT, 3)(value, where)
+    else:
+        _number(0, note="a number of at least 0 or a list of 3")(value, where)
+
+
+def _fit(extra: dict[str, _Check], optional: dict[str, _Check] | None = None) -> _Check:
+    shape = _object(_FIT | extra, optional)
+
+    def check(value: Any, where: str) -> None:
+        shape(value, where)
+        inside = f"{where}.parameters" if where else "parameters"
+        parameters = value["parameters"]
+        _choice(value["model"])(parameters["model"], f"{inside}.model")
+        if value["model"] == "interpolated":
+            _INTERPOLATION(parameters["interpolation"], f"{inside}.interpolation")
+
+    return check
+
+
+def _models(value: Any, where: str) -> None:
+    if not isinstance(value, dict):
+        raise _Mismatch(where, "an object", value)
+    for model, fit in value.items():
+        _choice(*MODELS)(model, f"the key in {where}")
+        _fit({"model": _choice(model)})(fit, f"{where}.{model}")
+
+
+_TEXT = _kind("text", lambda value: isinstance(value, str))
+_FLAG = _kind("true or false", lambda value: isinstance(value, bool))
+_COUNT = _kind(
+    "a whole number of at least 0",
+    lambda value: isinstance(value, int) and not isinstance(value, bool) and value >= 0,
+)
+_NUMBER = _number(-math.inf)
+_AMOUNT = _number(0, note="a number of at least 0")
+_INTERPOLATION = _number(0, 1, "a number from 0 to 1")
+_UNKNOWN = _or_null(_NUMBER)
+_COLOR = _list(_AMOUNT, 3)
+_COLORS = _list(_list(_UNKNOWN, 3))
+_PARAMETERS = _object(
+    {
+        "model": _choice(*MODELS),
+        "diffuse": _COLOR,
+        "specular": _COLOR,
+        "exponent": _exponent,
+        "interpolation": _or_null(_INTERPOLATION),
+        "ior": _or_null(_number(1, note="a number of at least 1")),
+    }
+)
+_FIGURE = _object({"pooled": _UNKNOWN, "rgb": _list(_UNKNOWN, 3)})
+_STAGE = _object({"name": _TEXT, "l1": _UNKNOWN, "seconds": _AMOUNT, "iterations": _COUNT})
+_PRINCIPLED = _object(
+    {
+        "base_color": _COLOR,
+        "metallic": _INTERPOLATION,
+        "roughness": _INTERPOLATION,
+        "ior": _AMOUNT,
+        "specular_tint": _COLOR,
+        "error": _UNKNOWN,
+    }
+)
+_FIT: dict[str, _Check] = {
+    "model": _choice(*MODELS),
+    "parameters": _PARAMETERS,
+    "error": _object({name: _FIGURE for name in ERRORS}),
+    "stages": _list(_STAGE),
+    "seconds": _object({key: _AMOUNT for key in ("read", "start", "fit", "total")}),
+    "converged": _FLAG,
+    "certainty": _object({"starts": _COUNT, "agree": _COUNT, "spread": _UNKNOWN}),
+    "albedo": _object({"view_angle": _list(_NUMBER), "measured": _COLORS, "model": _COLORS}),
+    "warnings": _list(_TEXT),
+    "principled": _PRINCIPLED,
+}
+_BINS = _object({key: _COUNT for key in ("valid", "below_horizon", "negative", "non_finite")})
+_RECORD = _fit(
+    {
+        "source": _object(
+            {"path": _or_null(_TEXT), "sha256": _or_null(_TEXT), "format": _TEXT, "bins": _BINS},
+            {"name": _TEXT},
+        ),
+        "schedule": _choice("stages", "polish"),
+        "norm": _choice("l1", "cosine-l1", "l2", "log-l2"),
+        "channels": _choice("shared", "separate"),
+        "max_angle": _number(0, 90, "a number from 0 to 90"),
+    },
+    {
+        "machine": _object({"system": _TEXT, "processor": _TEXT, "threads": _COUNT}),
+        "models": _models,
+    },
+)

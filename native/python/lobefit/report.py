@@ -1,0 +1,274 @@
+"""The report: pictures, parameters, errors and run times of records, in one page and one table."""
+
+import base64
+import csv
+import io
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from html import escape
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobefit import picture, preview
+from lobefit.atomic import make_folder, write_bytes
+from lobefit.plot import Line, legend, plot
+from lobefit.record import ERRORS, Fit, Record
+
+_COLORS = {
+    "modified-phong": "#c2571a",
+    "modified-blinn-phong": "#2a6fb0",
+    "interpolated": "#2c8a4b",
+}
+_CHANNELS = (("red", "#c8402f"), ("green", "#3b8f3e"), ("blue", "#3166c4"))
+_ERROR_TITLES = {
+    "l1": "mean |f &minus; m|",
+    "relative_l1": "relative L1",
+    "relative_l1_80": "relative L1 below 80&deg;",
+    "relative_l1_cosine": "relative L1, cosine-weighted",
+}
+
+_STYLE = """
+:root { color-scheme: light dark; --ink: #1d1f23; --faint: #6a6f78; --line: #dfe2e6; --paper: #fff;
+  --page: #f4f5f7 }
+@media (prefers-color-scheme: dark) { :root { --ink: #e8e9eb; --faint: #9aa0a9; --line: #3a3d43;
+  --paper: #202226; --page: #17181b } }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page);
+  margin: 0 auto; padding: 2rem 1.5rem 4rem; max-width: 1240px }
+h1 { font-size: 1.7rem; margin: 0 0 .2rem } h2 { font-size: 1.25rem; margin: 0 }
+h3 { font-size: .95rem; margin: 1.4rem 0 .4rem } p { margin: .3rem 0 }
+.faint { color: var(--faint) }
+section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
+  padding: 1.2rem 1.4rem; margin-top: 1.4rem }
+img { display: block; max-width: 100%; height: auto; border-radius: 6px; margin: .8rem 0 }
+.wide { overflow-x: auto } .side { display: flex; flex-wrap: wrap; gap: 0 2rem }
+.side > div { flex: 1 1 400px; max-width: 560px }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem }
+th { text-align: left; font-weight: 600 } td, th { padding: .22rem .9rem .22rem 0;
+  border-bottom: 1px solid var(--line); vertical-align: top }
+tr.own td { font-weight: 600 } code { font-size: .85rem; overflow-wrap: anywhere }
+.plot { width: 100%; height: auto } .plot text { fill: var(--faint); font-size: 11px }
+.plot .middle { text-anchor: middle } .plot .end { text-anchor: end }
+.grid { stroke: var(--line) } .curve { fill: none; stroke-width: 2 }
+.legend span { margin-right: 1.1rem; font-size: .85rem; white-space: nowrap;
+  display: inline-block } .legend svg { margin-right: .4rem }
+.warning { border-left: 3px solid #d9902f; padding-left: .7rem }
+"""
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """What Cycles made of a record's material: radiance as `preview.row` takes it, and seconds."""
+
+    pixels: NDArray[np.float32]
+    seconds: float
+
+
+def write(
+    folder: str | os.PathLike[str],
+    records: list[Record],
+    renderings: Mapping[str, Rendering] | None = None,
+    failures: Iterable[str] = (),
+) -> None:
+    """Writes index.html and report.csv. `renderings` are found by a record's name."""
+    place = make_folder(folder)
+    write_bytes(place / "report.csv", table(records).encode())
+    write_bytes(place / "index.html", page(records, renderings or {}, failures).encode())
+
+
+def table(records: list[Record]) -> str:
+    """A line for every stage of every fit, as CSV: errors of the fit, run time of the stage."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    parameters = ("diffuse", "specular", "exponent", "interpolation", "ior")
+    head = ["material", "sha256", "model", "norm", "schedule", *parameters, *ERRORS]
+    writer.writerow([*head, "stage", "stage_l1", "stage_seconds", "iterations", "total_seconds"])
+    for record in records:
+        for model, fit in record.fits.items():
+            values = [record.name, record.source["sha256"], model, record.norm, record.schedule]
+            values += [_plain(fit.parameters[name]) for name in parameters]
+            values += [fit.error[name]["pooled"] for name in ERRORS]
+            for stage in fit.stages:
+                cells = [stage[key] for key in ("name", "l1", "seconds", "iterations")]
+                writer.writerow([*values, *cells, fit.seconds["total"]])
+    return text.getvalue()
+
+
+def page(
+    records: list[Record], renderings: Mapping[str, Rendering], failures: Iterable[str]
+) -> str:
+    """The whole page; it refers to nothing outside of itself."""
+    body = [
+        "<h1>Measured materials as Phong lobes</h1>",
+        '<p class="faint">Fits of the models of Nielsen et al., &ldquo;Addressing Grazing Angle '
+        "Reflections in Phong Models&rdquo;. Spheres under a light from the upper right and one "
+        "from behind at the lower left, each row at one exposure.</p>",
+        *(f'<p class="warning">{escape(failure)}</p>' for failure in failures),
+        _overview(records),
+        *(
+            _section(index, record, renderings.get(record.name))
+            for index, record in enumerate(records)
+        ),
+    ]
+    head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    title = "<title>Lobefit report</title>"
+    return (
+        f'<!DOCTYPE html><html lang="en"><head>{head}{title}<style>{_STYLE}</style></head>'
+        f"<body>{''.join(body)}</body></html>\n"
+    )
+
+
+def _overview(records: list[Record]) -> str:
+    rows = [
+        [
+            f'<a href="#m{index}">{escape(record.name)}</a>',
+            preview.TITLES[record.model],
+            *(_number(record.error[name]["pooled"]) for name in ERRORS[1:]),
+            f"{sum(fit.seconds['total'] for fit in record.fits.values()):.2f}",
+        ]
+        for index, record in enumerate(records)
+    ]
+    head = ["material", "best model", *(_ERROR_TITLES[name] for name in ERRORS[1:]), "seconds"]
+    return f"<section><h2>Overview</h2>{_table(head, rows)}</section>"
+
+
+def _section(index: int, record: Record, rendering: Rendering | None) -> str:
+    return "".join(
+        [
+            f'<section id="m{index}"><h2>{escape(record.name)}</h2>',
+            _about(record),
+            *(f'<p class="warning">{escape(text)}</p>' for text in record.warnings),
+            _spheres(record, rendering),
+            "<h3>Parameters</h3>",
+            _parameters(record),
+            "<h3>Errors</h3>",
+            _errors(record),
+            '<div class="side"><div><h3>Error against run time</h3>',
+            _run_time_plot(record),
+            "</div><div><h3>Albedo by view angle</h3>",
+            _albedo_plot(record),
+            "</div></div><h3>Seconds by stage</h3>",
+            _stages(record),
+            _facts(record, rendering),
+            "</section>",
+        ]
+    )
+
+
+def _about(record: Record) -> str:
+    bins = record.source["bins"]
+    return (
+        f'<p class="faint">{escape(record.source["format"])}, {bins["valid"]:,} valid bins, '
+        f"{bins['below_horizon']:,} below the horizon, {bins['negative']:,} negative, "
+        f"{bins['non_finite']:,} not finite; norm {record.norm}, schedule {record.schedule}</p>"
+    )
+
+
+def _spheres(record: Record, rendering: Rendering | None) -> str:
+    measurement = preview.measurement_of(record)
+    pixels = rendering.pixels if rendering else None
+    sheet = preview.sheet([preview.row(record, measurement, rendered=pixels)])
+    source = base64.b64encode(picture.png(sheet)).decode()
+    caption = escape(f"{record.name}: measurement and fits")
+    return f'<img alt="{caption}" src="data:image/png;base64,{source}">'
+
+
+def _parameters(record: Record) -> str:
+    head = ["model", "diffuse", "specular", "exponent", "interpolation", "IOR", "converged"]
+    rows = []
+    for model, fit in record.fits.items():
+        values = (fit.parameters[name] for name in ("diffuse", "specular", "exponent"))
+        rest = (fit.parameters[name] for name in ("interpolation", "ior"))
+        yes = "yes" if fit.converged else "no"
+        rows.append([preview.TITLES[model], *map(_numbers, values), *map(_number, rest), yes])
+    return _table(head, rows, _own(record))
+
+
+def _errors(record: Record) -> str:
+    rows = [
+        [preview.TITLES[model], *(_number(fit.error[name]["pooled"]) for name in ERRORS)]
+        for model, fit in record.fits.items()
+    ]
+    return _table(["model", *_ERROR_TITLES.values()], rows, _own(record))
+
+
+def _stages(record: Record) -> str:
+    rows = []
+    for model, fit in record.fits.items():
+        rows.append([preview.TITLES[model], "read", f"{fit.seconds['read']:.3f}", "", ""])
+        for stage in fit.stages:
+            cells = [f"{stage['seconds']:.3f}", str(stage["iterations"]), _number(stage["l1"])]
+            rows.append(["", escape(stage["name"]), *cells])
+        rows.append(["", "total", f"{fit.seconds['total']:.3f}", "", ""])
+    return _table(["model", "stage", "seconds", "iterations", "error after it"], rows)
+
+
+def _run_time_plot(record: Record) -> str:
+    lines = [_run_time(model, fit) for model, fit in record.fits.items()]
+    return plot(lines, "seconds since the start", "error in the norm") + legend(lines)
+
+
+def _run_time(model: str, fit: Fit) -> Line:
+    ends = list(accumulate((stage["seconds"] for stage in fit.stages), initial=fit.seconds["read"]))
+    dots = [
+        f"{stage['name']}: {_number(stage['l1'])} after {end:.3f} s"
+        for stage, end in zip(fit.stages, ends[1:], strict=True)
+    ]
+    errors = [stage["l1"] for stage in fit.stages]
+    return Line(preview.TITLES[model], ends[1:], errors, _COLORS[model], dots=dots)
+
+
+def _albedo_plot(record: Record) -> str:
+    lines = []
+    for kind in ("measured", "model"):
+        for index, (channel, color) in enumerate(_CHANNELS):
+            values = [entry[index] for entry in record.albedo[kind]]
+            angles = record.albedo["view_angle"]
+            lines.append(Line(f"{kind}, {channel}", angles, values, color, kind == "model"))
+    return plot(lines, "view angle in degrees", "albedo") + legend(lines)
+
+
+def _facts(record: Record, rendering: Rendering | None) -> str:
+    machine = record.machine
+    certainty = record.certainty
+    facts = {
+        "Certainty": f"{certainty['agree']} of {certainty['starts']} starts agree",
+        "Machine": f"{machine['processor']}, {machine['threads']} threads, {machine['system']}",
+        "Source": f"SHA-256 {record.source['sha256'] or 'unknown'}",
+    }
+    if rendering:
+        pixels = " x ".join(map(str, rendering.pixels.shape[:2]))
+        facts["Rendering"] = f"{rendering.seconds:.2f} s for {pixels} pixels with Cycles"
+    lines = [f"<p><b>{escape(key)}</b> {escape(value)}</p>" for key, value in facts.items()]
+    return f"<h3>How it was made</h3>{''.join(lines)}<p><code>{escape(record.command())}</code></p>"
+
+
+def _table(head: list[str], rows: list[list[str]], own: int | None = None) -> str:
+    """A table of HTML cells; the row `own` is that of the record's own model."""
+    top = "".join(f"<th>{cell}</th>" for cell in head)
+    body = "".join(
+        f"<tr{' class=own' if index == own else ''}>"
+        + "".join(f"<td>{cell}</td>" for cell in row)
+        + "</tr>"
+        for index, row in enumerate(rows)
+    )
+    return f'<div class="wide"><table><tr>{top}</tr>{body}</table></div>'
+
+
+def _own(record: Record) -> int:
+    return list(record.fits).index(record.model)
+
+
+def _number(value: float | None) -> str:
+    return "&ndash;" if value is None else f"{value:.5g}"
+
+
+def _numbers(values: Any) -> str:
+    return ", ".join(map(_number, values)) if isinstance(values, list) else _number(values)
+
+
+def _plain(values: Any) -> Any:
+    return " ".join(map(repr, values)) if isinstance(values, list) else values

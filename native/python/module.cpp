@@ -1,0 +1,397 @@
+// lobefit._native: the C++ core as Python sees it. Conversion alone;
+// native/python/lobefit/_native.pyi has the types.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "closures/compute_record.h"
+#include "closures/live_lobe.h"
+#include "closures/principled.h"
+#include "fitting/job.h"
+#include "measurement/input_error.h"
+#include "measurement/measurement.h"
+#include "measurement/merl.h"
+#include "measurement/read_measurement.h"
+#include "preview/two_lights.h"
+#include "reflectance/abc.h"
+#include "reflectance/model.h"
+
+namespace py = pybind11;
+
+namespace lobefit {
+namespace {
+
+using SharedMeasurement = std::shared_ptr<Measurement>;
+using RecordJob = Job<RecordContents>;
+using DirectionArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+std::vector<double> to_list(const Rgb& rgb) { return {rgb[0], rgb[1], rgb[2]}; }
+
+// dict["key"] as three numbers; one number stands for three equal ones.
+Rgb rgb_from(const py::dict& dict, const char* key) {
+  if (!dict.contains(key)) throw InputError(std::string("parameters: '") + key + "' is missing.");
+  const py::object value = dict[key];
+  if (!py::isinstance<py::sequence>(value)) return Rgb::Constant(value.cast<double>());
+  const auto list = value.cast<std::vector<double>>();
+  if (list.size() != 3) {
+    throw InputError(std::string("parameters: '") + key + "' needs three numbers, found " +
+                     std::to_string(list.size()) + ".");
+  }
+  return {list[0], list[1], list[2]};
+}
+
+double number_from(const py::dict& dict, const char* key, double otherwise) {
+  if (!dict.contains(key) || dict[key].is_none()) return otherwise;
+  return dict[key].cast<double>();
+}
+
+Parameters parameters_from(const py::dict& dict) {
+  Parameters parameters;
+  parameters.kind = model_named(dict["model"].cast<std::string>());
+  parameters.diffuse = rgb_from(dict, "diffuse");
+  parameters.specular = rgb_from(dict, "specular");
+  parameters.exponent = rgb_from(dict, "exponent");
+  parameters.interpolation = number_from(dict, "interpolation", 0);
+  const double ior = number_from(dict, "ior", std::numeric_limits<double>::quiet_NaN());
+  if (!std::isnan(ior)) parameters.ior = ior;
+  return parameters;
+}
+
+py::dict to_dict(const Parameters& parameters) {
+  using namespace py::literals;
+  const Rgb& s = parameters.exponent;
+  const bool shared = s[0] == s[1] && s[1] == s[2];
+  const bool interpolated = parameters.kind == ModelKind::interpolated;
+  return py::dict(
+      "model"_a = std::string(name_of(parameters.kind)), "diffuse"_a = to_list(parameters.diffuse),
+      "specular"_a = to_list(parameters.specular),
+      "exponent"_a = shared ? py::object(py::float_(s[0])) : py::object(py::cast(to_list(s))),
+      "interpolation"_a =
+          interpolated ? py::object(py::float_(parameters.interpolation)) : py::object(py::none()),
+      "ior"_a = parameters.ior ? py::object(py::float_(*parameters.ior)) : py::object(py::none()));
+}
+
+Principled principled_from(const py::dict& dict) {
+  return {rgb_from(dict, "base_color"),      number_from(dict, "metallic", 0),
+          number_from(dict, "roughness", 0), number_from(dict, "ior", 1.5),
+          rgb_from(dict, "specular_tint"),   number_from(dict, "error", 0)};
+}
+
+py::dict to_dict(const Principled& principled) {
+  using namespace py::literals;
+  return py::dict("base_color"_a = to_list(principled.base_color),
+                  "metallic"_a = principled.metallic, "roughness"_a = principled.roughness,
+                  "ior"_a = principled.ior, "specular_tint"_a = to_list(principled.specular_tint),
+                  "error"_a = principled.error);
+}
+
+py::dict to_dict(const BinCounts& bins) {
+  using namespace py::literals;
+  return py::dict("valid"_a = bins.valid, "below_horizon"_a = bins.below_horizon,
+                  "negative"_a = bins.negative, "non_finite"_a = bins.non_finite);
+}
+
+py::dict to_dict(const ErrorFigure& figure) {
+  using namespace py::literals;
+  return py::dict("pooled"_a = figure.pooled, "rgb"_a = to_list(figure.rgb));
+}
+
+py::dict to_dict(const ErrorFigures& errors) {
+  using namespace py::literals;
+  return py::dict("l1"_a = to_dict(errors.l1), "relative_l1"_a = to_dict(errors.relative_l1),
+                  "relative_l1_80"_a = to_dict(errors.relative_l1_80),
+                  "relative_l1_cosine"_a = to_dict(errors.relative_l1_cosine));
+}
+
+py::list to_list(const std::vector<Stage>& stages) {
+  using namespace py::literals;
+  py::list list;
+  for (const Stage& stage : stages) {
+    list.append(py::dict("name"_a = stage.name, "l1"_a = stage.error, "seconds"_a = stage.seconds,
+                         "iterations"_a = stage.iterations));
+  }
+  return list;
+}
+
+py::list to_list(const std::vector<Rgb>& colours) {
+  py::list list;
+  for (const Rgb& colour : colours) list.append(to_list(colour));
+  return list;
+}
+
+py::dict to_dict(const RecordContents& contents, const FitOptions& options) {
+  using namespace py::literals;
+  const Fit& fit = contents.fit;
+  const Certainty& certainty = fit.certainty;
+  return py::dict(
+      "model"_a = std::string(name_of(options.kind)), "parameters"_a = to_dict(fit.parameters),
+      "error"_a = to_dict(fit.errors), "schedule"_a = std::string(name_of(options.schedule)),
+      "norm"_a = std::string(name_of(options.norm)),
+      "channels"_a = options.separate_channels ? "separate" : "shared",
+      "max_angle"_a = options.max_angle_degrees, "stages"_a = to_list(fit.stages),
+      "seconds"_a = py::dict("read"_a = contents.read_seconds, "start"_a = fit.start_seconds,
+                             "fit"_a = fit.fit_seconds, "total"_a = contents.total_seconds),
+      "converged"_a = fit.converged,
+      "certainty"_a = py::dict("starts"_a = certainty.starts, "agree"_a = certainty.agree,
+                               "spread"_a = certainty.spread),
+      "albedo"_a = py::dict("view_angle"_a = contents.albedo.view_angle,
+                            "measured"_a = to_list(contents.albedo.measured),
+                            "model"_a = to_list(contents.albedo.model)),
+      "warnings"_a = fit.warnings, "bins"_a = to_dict(contents.bins), "format"_a = "MERL",
+      "principled"_a = to_dict(contents.principled));
+}
+
+// f (or f cos) for each row of two (N, 3) arrays of unit vectors.
+py::array_t<double> evaluate_rows(const Reflectance& reflectance, const DirectionArray& wi,
+                                  const DirectionArray& wo) {
+  if (wi.ndim() != 2 || wo.ndim() != 2 || wi.shape(1) != 3 || wo.shape(1) != 3 ||
+      wi.shape(0) != wo.shape(0)) {
+    throw InputError("directions: expected two arrays of the same shape (N, 3).");
+  }
+  const py::ssize_t count = wi.shape(0);
+  py::array_t<double> result({count, py::ssize_t{3}});
+  const double* in = wi.data();
+  const double* out = wo.data();
+  double* values = result.mutable_data();
+  const py::gil_scoped_release release;
+  for (py::ssize_t i = 0; i < 3 * count; i += 3) {
+    Eigen::Map<Rgb>(values + i) = reflectance(Vector3(in + i), Vector3(out + i));
+  }
+  return result;
+}
+
+Reflectance with_cosine(Reflectance reflectance) {
+  return [reflectance = std::move(reflectance)](const Vector3& wi, const Vector3& wo) {
+    return Rgb(reflectance(wi, wo) * std::max(wi.z(), 0.0));
+  };
+}
+
+Reflectance model_reflectance(const Parameters& parameters) {
+  return [=](const Vector3& wi, const Vector3& wo) { return evaluate_model(parameters, wi, wo); };
+}
+
+Reflectance live_reflectance(const Parameters& parameters) {
+  return [=](const Vector3& wi, const Vector3& wo) { return live_lobe(parameters, wi, wo); };
+}
+
+Reflectance principled_reflectance(const Principled& principled) {
+  return
+      [=](const Vector3& wi, const Vector3& wo) { return evaluate_principled(principled, wi, wo); };
+}
+
+Reflectance measured_reflectance(SharedMeasurement measurement) {
+  return [measurement = std::move(measurement)](const Vector3& wi, const Vector3& wo) {
+    return measurement->evaluate(wi, wo);
+  };
+}
+
+// f cos of what a preview can show: a Measurement, a dict of parameters, ("live", parameters) or
+// ("principled", its dict).
+Reflectance previewed(const py::object& source) {
+  if (py::isinstance<Measurement>(source)) {
+    return with_cosine(measured_reflectance(source.cast<SharedMeasurement>()));
+  }
+  if (py::isinstance<py::dict>(source)) {
+    return with_cosine(model_reflectance(parameters_from(source.cast<py::dict>())));
+  }
+  const auto [kind, dict] = source.cast<std::pair<std::string, py::dict>>();
+  if (kind == "live") return live_reflectance(parameters_from(dict));
+  if (kind == "principled") return principled_reflectance(principled_from(dict));
+  throw InputError("preview: expected 'live' or 'principled', found '" + kind + "'.");
+}
+
+py::array_t<float> preview(const py::object& source, int size) {
+  if (size < 1 || size > 8192) {
+    throw InputError("preview: expected a size of 1 to 8192 pixels, found " + std::to_string(size) +
+                     ".");
+  }
+  const Reflectance reflectance = previewed(source);
+  std::vector<float> pixels;
+  {
+    const py::gil_scoped_release release;
+    pixels = render_two_lights(reflectance, size);
+  }
+  return py::array_t<float>({size, size, 3}, pixels.data());
+}
+
+// A read-only view of the table that keeps the measurement alive.
+py::array_t<double> values_of(const SharedMeasurement& measurement) {
+  py::array_t<double> view(
+      {3, Measurement::theta_h_bins, Measurement::theta_d_bins, Measurement::phi_d_bins},
+      measurement->planes().data(), py::cast(measurement));
+  view.attr("flags").attr("writeable") = false;
+  return view;
+}
+
+SharedMeasurement tabulated(const Parameters& parameters) {
+  return std::make_shared<Measurement>(Measurement::tabulate(
+      [&](const HalfDifference& at) { return evaluate_model(parameters, at); }));
+}
+
+SharedMeasurement from_values(const DirectionArray& values) {
+  if (values.ndim() != 4 || values.size() != 3 * py::ssize_t{Measurement::bin_count}) {
+    throw InputError("values: expected an array of shape (3, 90, 90, 180).");
+  }
+  return std::make_shared<Measurement>(
+      std::vector<double>(values.data(), values.data() + values.size()));
+}
+
+// Everything about the job that its thread needs to be told.
+struct PythonJob {
+  PythonJob(MeasurementSource source, const FitOptions& asked)
+      : options(asked), job([source = std::move(source), asked](Monitor& monitor) {
+          return compute_record(source, asked, monitor);
+        }) {}
+
+  FitOptions options;
+  RecordJob job;
+};
+
+std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string& model,
+                                     bool fresnel, const std::string& schedule,
+                                     const std::string& norm, double max_angle,
+                                     const std::string& channels, int threads) {
+  FitOptions options;
+  options.kind = model_named(model);
+  options.fresnel = fresnel;
+  options.schedule = schedule_named(schedule);
+  options.norm = norm_named(norm);
+  if (!(max_angle > 0 && max_angle <= 90)) {
+    throw InputError("max_angle: expected degrees above 0 and up to 90, found " +
+                     std::to_string(max_angle) + ".");
+  }
+  options.max_angle_degrees = max_angle;
+  if (channels != "shared" && channels != "separate") {
+    throw InputError("channels: expected shared or separate, found '" + channels + "'.");
+  }
+  options.separate_channels = channels == "separate";
+  if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
+  options.threads = threads;
+  if (py::isinstance<Measurement>(source)) {
+    return std::make_unique<PythonJob>(source.cast<std::shared_ptr<const Measurement>>(), options);
+  }
+  return std::make_unique<PythonJob>(source.cast<std::filesystem::path>(), options);
+}
+
+void bind_measurement(py::module_& module) {
+  py::class_<Measurement, SharedMeasurement>(
+      module, "Measurement", "A measured isotropic reflectance on the MERL grid, in 1/sr.")
+      .def_static(
+          "read",
+          [](const std::filesystem::path& path) {
+            const py::gil_scoped_release release;
+            return std::make_shared<Measurement>(read_measurement(path));
+          },
+          py::arg("path"), "Reads a file; InputError says what is wrong with it.")
+      .def_static(
+          "from_model",
+          [](const py::dict& parameters) { return tabulated(parameters_from(parameters)); },
+          py::arg("parameters"), "The table of a model.")
+      .def_static("from_values", &from_values, py::arg("values"),
+                  "A table of shape (3, 90, 90, 180) in 1/sr; negative or not finite is invalid.")
+      .def_property_readonly("values", &values_of,
+                             "(3, 90, 90, 180) in 1/sr, NaN where invalid; read-only.")
+      .def_property_readonly("bins", [](const Measurement& m) { return to_dict(m.bins()); })
+      .def_property_readonly("format", [](const Measurement&) { return "MERL"; })
+      .def(
+          "evaluate",
+          [](const SharedMeasurement& m, const DirectionArray& wi, const DirectionArray& wo) {
+            return evaluate_rows(measured_reflectance(m), wi, wo);
+          },
+          py::arg("wi"), py::arg("wo"),
+          "f in 1/sr, (N, 3), between the bins; NaN where it is not known.")
+      .def(
+          "write",
+          [](const Measurement& m, const std::filesystem::path& path) {
+            const py::gil_scoped_release release;
+            write_merl(m, path);
+          },
+          py::arg("path"), "Writes a MERL .binary file.");
+}
+
+void bind_job(py::module_& module) {
+  py::class_<PythonJob>(module, "FitJob", "A fit that runs in a thread of its own.")
+      .def(py::init(&start_job), py::arg("source"), py::arg("model") = "interpolated",
+           py::arg("fresnel") = true, py::arg("schedule") = "polish", py::arg("norm") = "l1",
+           py::arg("max_angle") = 90.0, py::arg("channels") = "shared", py::arg("threads") = 0,
+           "Starts at once; source is a path or a Measurement.")
+      .def_property_readonly("progress", [](const PythonJob& p) { return p.job.progress(); })
+      .def_property_readonly("stage", [](const PythonJob& p) { return p.job.stage(); })
+      .def_property_readonly("done", [](const PythonJob& p) { return p.job.done(); })
+      .def("cancel", [](PythonJob& p) { p.job.cancel(); })
+      .def(
+          "wait",
+          [](const PythonJob& p, double seconds) {
+            const py::gil_scoped_release release;
+            return p.job.wait(std::chrono::duration<double>(seconds));
+          },
+          py::arg("seconds"), "Waits up to that long; True when the job is done.")
+      .def(
+          "result", [](const PythonJob& p) { return to_dict(p.job.result(), p.options); },
+          "The fit as a dict; raises what ended the job.");
+}
+
+void bind_errors(py::module_& module) {
+  py::register_exception<InputError>(module, "InputError", PyExc_ValueError);
+  py::register_exception<Cancelled>(module, "Cancelled");
+}
+
+void bind_functions(py::module_& module) {
+  module.def("sample_names", [] {
+    const auto names = sample_names();
+    return std::vector<std::string>(names.begin(), names.end());
+  });
+  module.def(
+      "sample",
+      [](const std::string& name) {
+        return std::make_shared<Measurement>(sample_measurement(name));
+      },
+      py::arg("name"), "The table of a published ABC fit (Low et al. 2012).");
+  module.def(
+      "evaluate_model",
+      [](const py::dict& parameters, const DirectionArray& wi, const DirectionArray& wo) {
+        return evaluate_rows(model_reflectance(parameters_from(parameters)), wi, wo);
+      },
+      py::arg("parameters"), py::arg("wi"), py::arg("wo"), "f in 1/sr, (N, 3).");
+  module.def(
+      "evaluate_live",
+      [](const py::dict& parameters, const DirectionArray& wi, const DirectionArray& wo) {
+        return evaluate_rows(live_reflectance(parameters_from(parameters)), wi, wo);
+      },
+      py::arg("parameters"), py::arg("wi"), py::arg("wo"),
+      "f cos(theta_i) of the live node group as Cycles renders it, (N, 3).");
+  module.def(
+      "evaluate_principled",
+      [](const py::dict& principled, const DirectionArray& wi, const DirectionArray& wo) {
+        return evaluate_rows(principled_reflectance(principled_from(principled)), wi, wo);
+      },
+      py::arg("principled"), py::arg("wi"), py::arg("wo"),
+      "f cos(theta_i) of a Principled BSDF as Cycles renders it, (N, 3).");
+  module.def(
+      "preview", &preview, py::arg("source"), py::arg("size"),
+      "The sphere under two lights, (size, size, 3) linear, row 0 at the top. source: a "
+      "Measurement, a dict of parameters, ('live', parameters) or ('principled', its dict).");
+}
+
+}  // namespace
+}  // namespace lobefit
+
+PYBIND11_MODULE(_native, module) {
+  module.doc() = "The compiled core of lobefit.";
+  module.attr("version") = LOBEFIT_VERSION;
+  module.attr("build_id") = LOBEFIT_BUILD_ID;
+  lobefit::bind_errors(module);
+  lobefit::bind_measurement(module);
+  lobefit::bind_job(module);
+  lobefit::bind_functions(module);
+}

@@ -1,0 +1,32 @@
+#include "reflectance/albedo.h"
+
+#include <cmath>
+
+namespace lobefit {
+
+Rgb directional_albedo(const Reflectance& reflectance, double view_angle) {
+  constexpr int rings = 180, sectors = 60;
+  const Vector3 wo(std::sin(view_angle), 0, std::cos(view_angle));
+  Rgb albedo = Rgb::Zero();
+  for (int ring = 0; ring < rings; ++ring) {
+    // theta_h = t^2 90 deg, so that dtheta_h = 2 t 90 deg dt.
+    const double t = (ring + 0.5) / rings;
+    const double theta_h = t * t * pi / 2, width = t * pi / rings;
+    const double sin_h = std::sin(theta_h), cos_h = std::cos(theta_h);
+    for (int sector = 0; sector < sectors; ++sector) {
+      // The plane of incidence is a plane of symmetry: half a turn is enough.
+      const double phi = (sector + 0.5) * pi / sectors;
+      const Vector3 half(sin_h * std::cos(phi), sin_h * std::sin(phi), cos_h);
+      const double incidence = wo.dot(half);
+      const Vector3 wi = 2 * incidence * half - wo;
+      if (!(incidence > 0 && wi.z() > 0)) continue;
+      const Rgb value = reflectance(wi, wo);
+      if (value.isNaN().any()) continue;
+      const double solid_angle = 4 * incidence * sin_h * width * 2 * pi / sectors;
+      albedo += value * wi.z() * solid_angle;
+    }
+  }
+  return albedo;
+}
+
+}  // namespace lobefit

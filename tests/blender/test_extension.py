@@ -1,0 +1,160 @@
+"""The extension as a whole: its coming and going, its panel, a module that is missing."""
+
+import sys
+from types import SimpleNamespace
+
+import bpy
+import lobefit
+import lobefit._native
+import lobefit.preview
+import pytest
+
+OPERATORS = ["cancel_fit", "fit", "import_measured", "preview"]
+
+
+class Recorder:
+    """Stands in for a layout: draws nothing, and refuses names that Blender would not find."""
+
+    def __init__(self):
+        self.texts, self.operators, self.properties = [], [], []
+        self.icons = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
+
+    def _nested(self, **_options):
+        return self
+
+    row = column = split = box = _nested
+
+    def label(self, text="", icon="NONE"):
+        assert icon in self.icons
+        self.texts.append(text)
+
+    def prop(self, data, name, **_options):
+        assert name in data.bl_rna.properties
+        self.properties.append(name)
+
+    def operator(self, idname, text="", icon="NONE"):
+        assert icon in self.icons
+        area, name = idname.split(".")
+        getattr(getattr(bpy.ops, area), name).get_rna_type()
+        self.operators.append(name)
+
+    def progress(self, factor, text):
+        assert 0 <= factor <= 1
+        self.texts.append(text)
+
+    def template_icon(self, icon_value, scale):
+        # Without a window there are no icons, and their number is 0.
+        assert icon_value >= 0 and scale > 0
+
+
+def draw_panel(**context):
+    """The panel of the Material tab, drawn with these members in the context."""
+    layout = Recorder()
+    with bpy.context.temp_override(**context):
+        panel = bpy.types.LOBEFIT_PT_measured_brdf
+        panel.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout
+
+
+@pytest.fixture
+def native(addon):
+    """The module that looks for the compiled one, without what it remembers."""
+    addon.native.problem.cache_clear()
+    yield addon.native
+    addon.native.problem.cache_clear()
+
+
+def test_registering_again_leaves_nothing(addon):
+    def ours():
+        drawn = (bpy.types.TOPBAR_MT_file_import, bpy.types.STATUSBAR_HT_header)
+        functions = [f.__module__ for menu in drawn for f in menu.draw._draw_funcs]
+        types = [name for name in dir(bpy.types) if name.startswith("LOBEFIT_")]
+        return types, [name for name in functions if name.startswith(addon.__name__)]
+
+    before = ours()
+    for _ in range(10):
+        addon.unregister()
+        assert ours() == ([], [])
+        assert dir(bpy.ops.lobefit) == []
+        addon.register()
+    assert ours() == before
+    assert sorted(dir(bpy.ops.lobefit)) == OPERATORS
+
+
+def test_unregister_ends_a_fit(addon, measured_file):
+    run = addon.operators.run
+    batch = addon.jobs.Batch([measured_file], {})
+    batch.advance(0.0)
+    run._current = run.Run(bpy.context, batch)
+    try:
+        assert draw_panel().operators == ["cancel_fit"]
+        assert not bpy.ops.lobefit.import_measured.poll()
+    finally:
+        addon.unregister()
+        addon.register()
+    assert run.current() is None
+
+
+def test_panel_without_a_material(addon):
+    layout = draw_panel()
+    assert layout.operators == ["import_measured"]
+    assert "No material is selected" in " ".join(layout.texts)
+
+
+def test_panel_with_another_material(addon):
+    layout = draw_panel(material=bpy.data.materials.new("plain"))
+    assert layout.operators == ["import_measured"]
+
+
+def test_panel_with_a_measured_material(addon, material):
+    layout = draw_panel(material=material)
+    assert layout.operators == ["fit", "preview"]
+    assert layout.properties == ["model", "fresnel", "norm", "threads"]
+    assert any("% of the reflected light" in text for text in layout.texts)
+
+
+def test_panel_shows_the_preview(addon, material):
+    with bpy.context.temp_override(material=material):
+        assert bpy.ops.lobefit.preview() == {"FINISHED"}
+    image = bpy.data.images["Lobefit Preview"]
+    assert image.size[0] == 3 * image.size[1]
+    titles = ["Measured", "As in Cycles", f"Difference x{lobefit.preview.AMPLIFIED}"]
+    assert draw_panel(material=material).texts[-3:] == titles
+    assert titles[0] not in draw_panel(material=bpy.data.materials.new("other")).texts
+
+
+def test_without_the_compiled_module(native, monkeypatch, measured_file):
+    monkeypatch.setitem(sys.modules, "lobefit", None)
+    assert "is not installed" in native.problem()
+    assert native.problem() in " ".join(draw_panel().texts)
+    with pytest.raises(RuntimeError, match="is not installed"):
+        bpy.ops.lobefit.import_measured(filepath=measured_file)
+    assert not bpy.data.materials
+
+
+def test_command(native, addon, monkeypatch, measured_file, capsys):
+    assert addon.cli._run(["info", measured_file]) == 0
+    assert "MERL" in capsys.readouterr().out
+    native.problem.cache_clear()
+    monkeypatch.setitem(sys.modules, "lobefit", None)
+    assert addon.cli._run(["info", measured_file]) == 2
+    assert native.problem() in capsys.readouterr().err
+
+
+def test_with_a_compiled_module_that_does_not_load(native, monkeypatch):
+    def refuse(name):
+        raise ImportError("version `GLIBC_9.9' not found\n")
+
+    monkeypatch.setattr(native.importlib, "import_module", refuse)
+    assert "GLIBC_9.9" in native.problem()
+    assert "\n" not in native.problem()
+
+
+@pytest.mark.parametrize(
+    ("owner", "name"), [(lobefit, "__version__"), (lobefit._native, "build_id")]
+)
+def test_after_an_update_without_a_restart(native, monkeypatch, owner, name):
+    assert native.problem() == ""
+    native.problem.cache_clear()
+    monkeypatch.setattr(owner, name, "0.0.1")
+    assert "restart Blender" in native.problem()

@@ -1,0 +1,198 @@
+#include "closures/principled.h"
+
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "closures/principled_terms.h"
+
+namespace lobefit {
+namespace {
+
+Vector3 direction(double theta_degrees, double phi_degrees) {
+  const double theta = radians(theta_degrees), phi = radians(phi_degrees);
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+Principled principled(const Rgb& base_color, double metallic, double roughness, double ior,
+                      const Rgb& specular_tint) {
+  return {base_color, metallic, roughness, ior, specular_tint, 0};
+}
+
+// The reflectance of a Principled BSDF, without the cosine.
+Reflectance reflectance_of(const Principled& material) {
+  return [material](const Vector3& wi, const Vector3& wo) -> Rgb {
+    return evaluate_principled(material, wi, wo) / wi.z();
+  };
+}
+
+Rgb albedo(const Principled& material, const Vector3& wo) {
+  constexpr int rings = 180, sectors = 180;
+  Rgb sum = Rgb::Zero();
+  for (int ring = 0; ring < rings; ++ring) {
+    const double theta = 90 * (ring + 0.5) / rings;
+    for (int sector = 0; sector < sectors; ++sector) {
+      const Vector3 wi = direction(theta, 360 * (sector + 0.5) / sectors);
+      sum += std::sin(radians(theta)) * evaluate_principled(material, wi, wo);
+    }
+  }
+  return sum * (pi / 2 / rings) * (2 * pi / sectors);
+}
+
+void expect_legal(const Principled& fit) {
+  EXPECT_TRUE((fit.base_color >= 0).all() && (fit.base_color <= 1).all()) << fit.base_color;
+  EXPECT_TRUE((fit.specular_tint >= 0).all() && (fit.specular_tint <= 1).all());
+  EXPECT_TRUE(fit.metallic >= 0 && fit.metallic <= 1) << fit.metallic;
+  EXPECT_TRUE(fit.roughness >= 0.03 - 1e-12 && fit.roughness <= 1) << fit.roughness;
+  EXPECT_TRUE(fit.ior >= 1 && fit.ior <= 99 + 1e-9) << fit.ior;
+  EXPECT_TRUE(std::isfinite(fit.error));
+}
+
+TEST(Principled, WithoutACoatIsLambert) {
+  const Rgb color(0.8, 0.3, 0.1);
+  const Vector3 wi = direction(50, 20), wo = direction(30, 140);
+  const Rgb value = evaluate_principled(principled(color, 0, 0.5, 1, Rgb::Ones()), wi, wo);
+  EXPECT_TRUE(value.isApprox(color * wi.z() / pi, 1e-12)) << value;
+}
+
+TEST(Principled, MetalFacingItsLightHasThePeakOfGgx) {
+  const Rgb color(0.8, 0.3, 0.1);
+  const Vector3 n = Vector3::UnitZ();
+  const Rgb value = evaluate_principled(principled(color, 1, 0.5, 1.5, Rgb::Ones()), n, n);
+  EXPECT_TRUE(value.isApprox(color / (4 * pi * std::pow(0.5, 4)), 1e-12)) << value;
+}
+
+TEST(Principled, DielectricFacingItsLightReflectsTintedF0) {
+  const Rgb tint(1, 0.5, 0);
+  const Vector3 n = Vector3::UnitZ();
+  const Rgb value = evaluate_principled(principled(Rgb::Zero(), 0, 0.5, 1.5, tint), n, n);
+  EXPECT_TRUE(value.isApprox(0.04 * tint / (4 * pi * std::pow(0.5, 4)), 1e-12)) << value;
+}
+
+TEST(Principled, IsZeroBelowTheHorizon) {
+  const Principled material = principled(Rgb::Ones(), 0.5, 0.5, 1.5, Rgb::Ones());
+  EXPECT_TRUE((evaluate_principled(material, direction(95, 0), direction(20, 0)) == 0).all());
+  EXPECT_TRUE((evaluate_principled(material, direction(20, 0), direction(95, 0)) == 0).all());
+}
+
+TEST(Principled, WithoutDiffusePartIsReciprocal) {
+  const Rgb color(0.9, 0.5, 0.2), tint(0.3, 0.6, 1);
+  for (const Principled& material :
+       {principled(color, 1, 0.4, 1.5, tint), principled(Rgb::Zero(), 0, 0.4, 1.5, tint)}) {
+    const Vector3 a = direction(70, 10), b = direction(25, 200);
+    const Rgb there = evaluate_principled(material, a, b) / a.z();
+    const Rgb back = evaluate_principled(material, b, a) / b.z();
+    EXPECT_TRUE(there.isApprox(back, 1e-12)) << there << " and " << back;
+  }
+}
+
+TEST(Principled, ReflectsNoMoreThanItReceives) {
+  for (const double metallic : {0.0, 0.4, 1.0}) {
+    for (const double roughness : {0.2, 0.5, 1.0}) {
+      for (const double ior : {1.0, 1.5, 20.0}) {
+        const Principled white = principled(Rgb::Ones(), metallic, roughness, ior, Rgb::Ones());
+        for (const double view : {5.0, 60.0, 80.0}) {
+          EXPECT_LE(albedo(white, direction(view, 0)).maxCoeff(), 1.001)
+              << metallic << ' ' << roughness << ' ' << ior << ' ' << view;
+        }
+      }
+    }
+  }
+}
+
+TEST(Principled, DerivativesAreThoseOfTheValues) {
+  using Dual = ceres::Jet<double, 9>;
+  const std::array<double, 9> point = {0.7, 0.4, 0.2, 0.9, 0.5, 0.3, 0.35, 0.43, 0.31};
+  const FacetGeometry at = facet_geometry(direction(55, 10), direction(40, 170));
+  const auto sockets = [](const auto& x) {
+    return PrincipledSockets<std::decay_t<decltype(x[0])>>{
+        {x[0], x[1], x[2]}, {x[3], x[4], x[5]}, x[6], x[7], x[8]};
+  };
+  std::array<Dual, 9> dual;
+  for (std::size_t i = 0; i < 9; ++i) dual[i] = Dual(point[i], static_cast<int>(i));
+  const auto values = principled_terms(sockets(dual), at);
+  for (std::size_t i = 0; i < 9; ++i) {
+    auto above = point, below = point;
+    above[i] += 1e-5;
+    below[i] -= 1e-5;
+    const auto high = principled_terms(sockets(above), at);
+    const auto low = principled_terms(sockets(below), at);
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(values[c].v[static_cast<int>(i)], (high[c] - low[c]) / 2e-5, 1e-7)
+          << "derivative of channel " << c << " by socket " << i;
+    }
+  }
+}
+
+TEST(FitPrincipled, FindsTheMaterialThatATargetIsMadeOf) {
+  for (const Principled& material : {
+           principled(Rgb(0.5, 0.2, 0.1), 0, 0.4, 1.5, Rgb(1, 0.9, 0.8)),
+           principled(Rgb(0.9, 0.6, 0.3), 1, 0.2, 1.5, Rgb(0.9, 0.8, 0.7)),
+           principled(Rgb(0.7, 0.1, 0.4), 0, 0.08, 1.8, Rgb(0.8, 0.8, 0.8)),
+           principled(Rgb(0.3, 0.3, 0.6), 0, 0.8, 1.4, Rgb(0.5, 0.6, 0.7)),
+       }) {
+    const Principled fit = fit_principled(reflectance_of(material));
+    expect_legal(fit);
+    EXPECT_LT(fit.error, 0.005);
+    EXPECT_LT((fit.base_color - material.base_color).abs().maxCoeff(), 0.01) << fit.base_color;
+    EXPECT_NEAR(fit.metallic, material.metallic, 0.01);
+    EXPECT_NEAR(fit.roughness, material.roughness, 0.005);
+  }
+}
+
+TEST(FitPrincipled, ReportsTheErrorOfBlackForWhatItCannotReach) {
+  // A surface a million times brighter than white: the best is still nearly all wrong.
+  const Principled fit =
+      fit_principled([](const Vector3&, const Vector3&) -> Rgb { return Rgb::Constant(1e6 / pi); });
+  expect_legal(fit);
+  EXPECT_NEAR(fit.error, 1, 1e-3);
+}
+
+TEST(FitPrincipled, GivesLegalSocketsForAnyTarget) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double value : {0.0, nan, infinity, -1.0, 1e-300, 1e-30, 1e-11, 1e30, 1e300}) {
+    SCOPED_TRACE(value);
+    expect_legal(fit_principled(
+        [value](const Vector3&, const Vector3&) -> Rgb { return Rgb::Constant(value); }));
+  }
+  // A single ray of light, and no light but at grazing angles.
+  expect_legal(fit_principled([](const Vector3& wi, const Vector3&) -> Rgb {
+    return Rgb::Constant(wi.z() > 0.999 ? 1e9 : 0);
+  }));
+  expect_legal(fit_principled([](const Vector3& wi, const Vector3&) -> Rgb {
+    return Rgb(wi.z() < 0.05 ? 1e6 : 0, 0, 1e-9);
+  }));
+}
+
+TEST(FitPrincipled, IsBlackWhereNothingShines) {
+  const Principled fit =
+      fit_principled([](const Vector3&, const Vector3&) -> Rgb { return Rgb::Zero(); });
+  EXPECT_TRUE((evaluate_principled(fit, direction(40, 0), direction(40, 180)) == 0).all());
+  EXPECT_EQ(fit.error, 0);
+}
+
+TEST(FitPrincipled, LeavesOutWhatIsNotKnown) {
+  const Principled material = principled(Rgb(0.5, 0.2, 0.1), 0, 0.4, 1.5, Rgb(1, 0.9, 0.8));
+  const Reflectance whole = reflectance_of(material);
+  const Principled fit = fit_principled([&](const Vector3& wi, const Vector3& wo) -> Rgb {
+    return wi.y() > 0.1 ? Rgb::Constant(std::numeric_limits<double>::quiet_NaN()) : whole(wi, wo);
+  });
+  EXPECT_LT(fit.error, 0.005);
+  EXPECT_LT((fit.base_color - material.base_color).abs().maxCoeff(), 0.01);
+}
+
+TEST(FitPrincipled, IsTheSameEveryTime) {
+  const Reflectance target =
+      reflectance_of(principled(Rgb(0.5, 0.2, 0.1), 0.3, 0.4, 1.5, Rgb(1, 0.9, 0.8)));
+  const Principled first = fit_principled(target), second = fit_principled(target);
+  EXPECT_EQ(first.error, second.error);
+  EXPECT_EQ(first.roughness, second.roughness);
+  EXPECT_TRUE((first.base_color == second.base_color).all());
+}
+
+}  // namespace
+}  // namespace lobefit

@@ -1,0 +1,227 @@
+"""The command line as a user meets it: exit codes, messages, files left behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lobefit import Record
+from lobefit.command_line import main
+
+SHAPE = (90, 90, 180)
+BYTES = 34_992_012
+
+
+def write_table(path: Path, dimensions=SHAPE, fill=0.5, order="<") -> Path:
+    values = np.full((3, *SHAPE), fill, order + "f8")
+    path.write_bytes(np.array(dimensions, order + "i4").tobytes() + values.tobytes())
+    return path
+
+
+def cut(path: Path, size: int) -> Path:
+    with write_table(path).open("rb+") as file:
+        file.truncate(size)
+    return path
+
+
+def written(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path
+
+
+def folder(path: Path) -> Path:
+    path.mkdir()
+    return path
+
+
+BAD_FILES = {
+    "empty": (lambda path: written(path, b""), "empty"),
+    "text": (lambda path: written(path, b"diffuse 0.1 0.2 0.3\n" * 20), "90 x 90 x 180 bins"),
+    "cut in its head": (lambda path: written(path, b"\x5a\0\0\0"), "bytes"),
+    "truncated": (lambda path: cut(path, BYTES // 2), "34,992,012 bytes, found 17,496,006"),
+    "a byte short": (lambda path: cut(path, BYTES - 1), "found 34,992,011"),
+    "too long": (lambda path: cut(path, BYTES + 8), "found 34,992,020"),
+    "permuted": (lambda path: write_table(path, (180, 90, 90)), "theta_h = 180"),
+    "negative": (lambda path: write_table(path, (-90, -90, 180)), "theta_h = -90"),
+    "huge": (lambda path: write_table(path, (2**31 - 1,) * 3), "2147483647"),
+    "big-endian": (lambda path: write_table(path, order=">"), "big-endian"),
+    "all bins invalid": (lambda path: write_table(path, fill=-1.0), "no valid bin"),
+    "all NaN": (lambda path: write_table(path, fill=np.nan), "not finite"),
+    "missing": (lambda path: path, "no such file"),
+}
+
+
+def refuse(capfd, *arguments) -> str:
+    """Runs a command that has to end with 2, and returns its only line on stderr."""
+    assert main([str(argument) for argument in arguments]) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert err.startswith("lobefit: ")
+    assert "Traceback" not in err
+    return err
+
+
+@pytest.mark.parametrize("kind", BAD_FILES)
+def test_bad_files_get_one_sentence(tmp_path, capfd, kind):
+    make, found = BAD_FILES[kind]
+    path = make(tmp_path / "bad.binary")
+    err = refuse(capfd, "info", path)
+    assert str(path) in err
+    assert found in err
+
+
+@pytest.mark.parametrize("command", ["fit", "preview", "report"])
+def test_a_bad_file_leaves_no_output(tmp_path, capfd, command):
+    path = written(tmp_path / "bad.binary", b"")
+    assert str(path) in refuse(capfd, command, path, "-o", tmp_path / "out")
+    assert os.listdir(tmp_path) == ["bad.binary"]
+
+
+def test_a_folder_is_no_measurement(tmp_path, capfd):
+    assert "found a folder" in refuse(capfd, "info", folder(tmp_path / "bad.binary"))
+
+
+def test_an_unknown_suffix_is_named(tmp_path, capfd):
+    assert ".exr" in refuse(capfd, "info", written(tmp_path / "picture.exr", b"v/1\1"))
+
+
+def test_a_file_without_permission_is_named(tmp_path, capfd):
+    if os.geteuid() == 0:
+        pytest.skip("root may read everything")
+    path = write_table(tmp_path / "mine.binary")
+    path.chmod(0)
+    assert "ermission" in refuse(capfd, "info", path)
+
+
+def test_an_empty_folder_has_nothing_to_fit(tmp_path, capfd):
+    err = refuse(capfd, "fit", tmp_path, "-o", tmp_path / "out")
+    assert "expected files named *.binary" in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["polish"],
+        ["fit"],
+        ["fit", "x.binary"],
+        ["fit", "x.binary", "-o", "x.json", "--model", "ward"],
+        ["fit", "x.binary", "-o", "x.json", "--max-angle", "91"],
+        ["fit", "x.binary", "-o", "x.json", "--max-angle", "nan"],
+        ["fit", "x.binary", "-o", "x.json", "--threads", "-1"],
+        ["fit", "x.binary", "-o", "x.json", "--threads", "many"],
+        ["preview", "x.json", "-o", "x.png", "--size", "0"],
+        ["sample", "folder", "unobtainium"],
+    ],
+    ids=" ".join,
+)
+def test_wrong_use_gets_one_sentence(capfd, arguments):
+    refuse(capfd, *arguments)
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_is_no_error(capfd, option):
+    with pytest.raises(SystemExit) as ended:
+        main([option])
+    assert ended.value.code == 0
+    assert "lobefit" in capfd.readouterr().out
+
+
+def test_samples_say_what_they_are(tmp_path, capfd):
+    assert main(["sample", str(tmp_path), "nickel"]) == 0
+    assert "nickel (from Low et al.'s ABC fit)" in capfd.readouterr().out
+    assert sorted(os.listdir(tmp_path)) == ["nickel.binary", "samples.csv"]
+    assert main(["info", "--json", str(tmp_path / "nickel.binary")]) == 0
+    facts = json.loads(capfd.readouterr().out)
+    assert facts["name"] == "nickel (from Low et al.'s ABC fit)"
+    assert facts["bytes"] == BYTES
+
+
+def test_another_file_does_not_inherit_the_name_of_a_sample(tmp_path, table, capfd):
+    assert main(["sample", str(tmp_path), "nickel"]) == 0
+    (tmp_path / "nickel.binary").write_bytes(table.read_bytes())
+    capfd.readouterr()
+    assert main(["info", "--json", str(tmp_path / "nickel.binary")]) == 0
+    assert "name" not in json.loads(capfd.readouterr().out)
+
+
+def test_a_second_sample_joins_the_list(tmp_path, capfd):
+    for name in ("nickel", "chrome"):
+        assert main(["sample", str(tmp_path), name]) == 0
+    names = (tmp_path / "samples.csv").read_text()
+    assert "nickel.binary" in names and "chrome.binary" in names
+
+
+def test_info_counts_damaged_bins(tmp_path, capfd):
+    path = write_table(tmp_path / "damaged.binary")
+    with path.open("rb+") as file:
+        file.seek(12 + 8 * 90)
+        file.write(np.array([-3.0, np.nan]).tobytes())
+    assert main(["info", str(path), "--json"]) == 0
+    facts = json.loads(capfd.readouterr().out)
+    assert facts["bins"]["negative"] == 1
+    assert facts["bins"]["non_finite"] == 1
+    assert len(facts["warnings"]) == 2
+
+
+def test_fit_writes_a_record_and_a_line_of_json(tmp_path, table, capfd):
+    output = tmp_path / "truth.json"
+    assert main(["fit", str(table), "--no-fresnel", "--json", "-o", str(output)]) == 0
+    lines = capfd.readouterr().out.splitlines()
+    assert len(lines) == 1
+    told = json.loads(lines[0])
+    assert told.pop("record") == str(output)
+    record = Record.load(output)
+    assert told == json.loads(record.to_json())
+    assert record.parameters["ior"] is None
+
+
+def test_one_bad_file_does_not_stop_the_others(tmp_path, table, capfd):
+    written(tmp_path / "bad.binary", b"")
+    (tmp_path / "good.binary").symlink_to(table)
+    code = main(["fit", str(tmp_path), "--model", "modified-phong", "-o", str(tmp_path / "out")])
+    assert code == 1
+    assert "bad.binary" in capfd.readouterr().err
+    assert os.listdir(tmp_path / "out") == ["good.json"]
+
+
+def test_a_record_cannot_be_written_onto_a_folder(tmp_path, table, capfd):
+    assert "found a folder" in refuse(capfd, "fit", table, "-o", tmp_path)
+
+
+def test_material_says_what_to_install(tmp_path, record, capfd, monkeypatch):
+    record.save(tmp_path / "gold.json")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    err = refuse(capfd, "material", tmp_path / "gold.json", "-o", tmp_path / "gold.blend")
+    assert "pip install 'lobefit[blender]'" in err
+
+
+def test_ctrl_c_leaves_nothing_behind(tmp_path, table):
+    (tmp_path / "out").mkdir()
+    for index in range(20):
+        (tmp_path / f"{index}.binary").symlink_to(table)
+    command = [sys.executable, "-m", "lobefit", "fit", str(tmp_path)]
+    process = subprocess.Popen(
+        [*command, "-o", str(tmp_path / "out")], stderr=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    while not os.listdir(tmp_path / "out"):
+        time.sleep(0.05)
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert err == b"lobefit: interrupted\n"
+    for name in os.listdir(tmp_path / "out"):
+        Record.load(tmp_path / "out" / name)
+
+
+def test_a_reader_that_goes_away_is_no_error(table):
+    command = f"'{sys.executable}' -m lobefit info --json {f'{table} ' * 3}| head -c 5"
+    ended = subprocess.run(command, shell=True, capture_output=True, timeout=60, check=True)
+    assert ended.stderr == b""

@@ -1,0 +1,126 @@
+"""The record: exact when read back, and one sentence for anything that is not one."""
+
+import dataclasses
+import json
+
+import pytest
+from lobefit import InputError, Record
+from lobefit.record import Fit
+
+
+def test_everything_is_exact_when_read_back(record, tmp_path):
+    record.save(tmp_path / "gold.json")
+    assert Record.load(tmp_path / "gold.json") == record
+
+
+def test_several_models_are_read_back_as_fits(record, tmp_path):
+    names = [field.name for field in dataclasses.fields(Fit)]
+    record.models = {"interpolated": Fit(**{name: getattr(record, name) for name in names})}
+    record.save(tmp_path / "gold.json")
+    again = Record.load(tmp_path / "gold.json")
+    assert again == record
+    assert isinstance(again.fits["interpolated"], Fit)
+
+
+def test_the_file_is_plain_json_of_schema_1(record):
+    data = json.loads(record.to_json())
+    assert data["schema"] == 1
+    assert {"source", "model", "parameters", "error", "stages", "seconds"} <= data.keys()
+
+
+def test_keys_of_a_later_version_are_no_error(record):
+    data = json.loads(record.to_json()) | {"closures": {"kind": "lobe"}}
+    assert Record.from_json(json.dumps(data)) == record
+
+
+def test_the_command_makes_the_record_again(record):
+    record.parameters["ior"] = None
+    assert record.command() == (
+        "lobefit fit /measured/gold.binary --model interpolated --no-fresnel --schedule polish "
+        "--norm l1 --channels shared --max-angle 90 -o gold.json"
+    )
+
+
+def test_a_record_is_called_by_its_sample_name_first(record):
+    assert record.name == "gold"
+    record.source["name"] = "gold (from a paper)"
+    assert record.name == "gold (from a paper)"
+
+
+def change(data, path, value):
+    """Sets the entry at `path` of nested objects and lists; a value of ... removes it."""
+    *outer, last = path
+    for key in outer:
+        data = data[key]
+    if value is ...:
+        del data[last]
+    else:
+        data[last] = value
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "sentence"),
+    [
+        (["schema"], 2, "expected schema to be 1, found 2."),
+        (["schema"], ..., "expected schema to be 1, found nothing."),
+        (["source"], ..., "expected source to be an object, found nothing."),
+        (["source", "bins", "valid"], -1, "a whole number of at least 0, found -1."),
+        (["source", "path"], 5, "expected source.path to be text, found 5."),
+        (["model"], "ward", "one of modified-phong, modified-blinn-phong, interpolated"),
+        (["parameters"], [1], "expected parameters to be an object, found [1]."),
+        (["parameters", "model"], "modified-phong", "expected parameters.model to be one of inter"),
+        (["parameters", "diffuse"], [0.1, 0.2], "parameters.diffuse to be a list of 3, found"),
+        (["parameters", "specular", 1], "x", "parameters.specular[1] to be a number of at least 0"),
+        (["parameters", "specular", 1], True, "a number of at least 0, found true."),
+        (["parameters", "specular", 1], 10**400, "a number of at least 0, found 1000"),
+        (["parameters", "exponent"], -1, "parameters.exponent to be a number of at least 0 or a"),
+        (["parameters", "exponent"], [1, 2], "parameters.exponent to be a list of 3"),
+        (["parameters", "interpolation"], 1.5, "a number from 0 to 1, found 1.5."),
+        (["parameters", "interpolation"], None, "a number from 0 to 1, found null."),
+        (["parameters", "ior"], 0.5, "parameters.ior to be a number of at least 1, found 0.5."),
+        (["error", "l1"], ..., "expected error.l1 to be an object, found nothing."),
+        (["error", "l1", "rgb"], None, "expected error.l1.rgb to be a list of 3, found null."),
+        (["stages", 0, "seconds"], "1", "expected stages[0].seconds to be a number of at least 0"),
+        (["seconds", "total"], ..., "expected seconds.total to be a number of at least 0"),
+        (["converged"], 1, "expected converged to be true or false, found 1."),
+        (["albedo", "measured", 0], 3, "expected albedo.measured[0] to be a list of 3, found 3."),
+        (["warnings"], "none", 'expected warnings to be a list, found "none".'),
+        (["principled", "roughness"], 2, "a number from 0 to 1, found 2."),
+        (["norm"], "l3", "expected norm to be one of l1, cosine-l1, l2, log-l2"),
+        (["max_angle"], 91, "expected max_angle to be a number from 0 to 90, found 91."),
+        (["models"], [], "expected models to be an object, found []."),
+        (["models"], {"ward": {}}, "expected the key in models to be one of modified-phong"),
+    ],
+)
+def test_what_is_wrong_is_named(record, tmp_path, path, value, sentence):
+    data = json.loads(record.to_json())
+    change(data, path, value)
+    file = tmp_path / "gold.json"
+    file.write_text(json.dumps(data))
+    with pytest.raises(InputError) as caught:
+        Record.load(file)
+    message = str(caught.value)
+    assert message.startswith(f"{file}: expected ")
+    assert sentence in message
+    assert "\n" not in message and message.endswith(".")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"", b"{", b"[]", b"null", b"3", b"\xff\xfe{", b"[" * 100_000, b'{"schema": NaN}', b"{}{}"],
+    ids=["empty", "cut", "list", "null", "number", "bytes", "deep", "NaN", "two"],
+)
+def test_other_files_are_no_records(tmp_path, text):
+    file = tmp_path / "gold.json"
+    file.write_bytes(text)
+    with pytest.raises(InputError, match=r"expected .* found ") as caught:
+        Record.load(file)
+    assert str(caught.value).startswith(f"{file}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_no_file_and_a_folder_are_no_records(tmp_path):
+    with pytest.raises(InputError, match="found no such file"):
+        Record.load(tmp_path / "none.json")
+    with pytest.raises(InputError, match="found a folder"):
+        Record.load(tmp_path)
