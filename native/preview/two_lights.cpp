@@ -22,9 +22,11 @@ Rgb shade(const Reflectance& f_times_cosine, const Vector3& normal) {
   Rgb radiance = Rgb::Zero();
   for (const Vector3& light : lights) {
     const Vector3 wi = to_local * light;
-    if (wi.z() > 0) radiance += f_times_cosine(wi, wo);
+    if (!(wi.z() > 0)) continue;
+    const Rgb reflected = f_times_cosine(wi, wo);
+    if (!reflected.isNaN().any()) radiance += reflected;
   }
-  return radiance.isNaN().any() ? Rgb::Zero() : radiance;
+  return radiance;
 }
 
 void render_row(const Reflectance& f_times_cosine, int size, int row, float* pixels) {

@@ -8,11 +8,11 @@
 namespace lobefit {
 
 // The picture of an orthographic sphere that fills a square of size x size pixels: three linear
-// floats a pixel (radiance), row by row from the top; 0 off the sphere and where the reflectance is
-// NaN. The reflectance given is f cos(theta_i), cosine included, and is called from several
-// threads. The camera looks from +z, x to the right and y up. Two lights of irradiance 1 come from
-// the directions (1, 1, 1.2), the upper right, and (-1, -1, -0.55), behind the lower left, which
-// grazes the rim.
+// floats a pixel (radiance), row by row from the top; 0 off the sphere. A light for which the
+// reflectance is NaN adds nothing. The reflectance given is f cos(theta_i), cosine included, and is
+// called from several threads. The camera looks from +z, x to the right and y up. Two lights of
+// irradiance 1 come from the directions (1, 1, 1.2), the upper right, and (-1, -1, -0.55), behind
+// the lower left, which grazes the rim.
 std::vector<float> render_two_lights(const Reflectance& f_times_cosine, int size);
 
 }  // namespace lobefit

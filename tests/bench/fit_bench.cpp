@@ -47,3 +47,5 @@ BENCHMARK_CAPTURE(fit_table, interpolated_stages, ModelKind::interpolated, Sched
 
 }  // namespace
 }  // namespace lobefit
+
+BENCHMARK_MAIN();

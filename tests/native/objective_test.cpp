@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -119,10 +120,10 @@ TEST_P(EveryObjective, HasTheGradientOfItsDifferences) {
   }
 }
 
-TEST_P(EveryObjective, HasTheMatrixOfReweightedSquares) {
+TEST_P(EveryObjective, HasTheMatrixOfEitherCurvature) {
   const VectorXd x = inside(variables_);
   const auto n = static_cast<Eigen::Index>(x.size());
-  MatrixXd expected = MatrixXd::Zero(n, n);
+  MatrixXd reweighted = MatrixXd::Zero(n, n), newton = MatrixXd::Zero(n, n);
   const bool linear = GetParam().norm == Norm::l1 || GetParam().norm == Norm::cosine_l1;
   for (const Samples::Run& run : samples_.runs) {
     for (std::size_t i = run.begin; i < run.end; ++i) {
@@ -136,18 +137,23 @@ TEST_P(EveryObjective, HasTheMatrixOfReweightedSquares) {
           slope[v] =
               (model(more, i, run.cos_theta_d, c) - model(less, i, run.cos_theta_d, c)) / 2e-5;
         }
+        const MatrixXd square = samples_.weight[i] * slope * slope.transpose();
         for (int half = 0; half < 2; ++half) {
           const double r = model(x, i, run.cos_theta_d, c) - samples_.measured[c][half][i];
-          const double w =
-              samples_.weight[i] / (linear ? std::sqrt(1 + r * r / (smoothing * smoothing)) : 1);
-          expected += w * slope * slope.transpose();
+          // rho'(r) / (2 r) and rho''(r) / 2 of rho = 2 e^2 (root - 1).
+          const double root = linear ? std::hypot(1, r / smoothing) : 1;
+          reweighted += square / root;
+          newton += square / (root * root * root);
         }
       }
     }
   }
-  const MatrixXd found = evaluate(x).hessian;
+  const Objective objective(samples_, variables_, GetParam().norm, smoothing, 1);
   // Slopes by central differences are known to about 1e-9.
-  EXPECT_LT((found - expected).norm(), 1e-6 * expected.norm());
+  EXPECT_LT((objective.evaluate(x, Curvature::reweighted).hessian - reweighted).norm(),
+            1e-6 * reweighted.norm());
+  EXPECT_LT((objective.evaluate(x, Curvature::newton).hessian - newton).norm(),
+            1e-6 * newton.norm());
 }
 
 TEST(Objective, HasTheSameBitsForAnyNumberOfThreads) {
@@ -199,28 +205,37 @@ TEST(CompressedCost, HasValueGradientAndMatrixOfTheObjective) {
   const VectorXd gradient = at.gradient(free);
   const MatrixXd hessian = at.hessian(free, free);
   EXPECT_NEAR(residuals.squaredNorm(), at.value, 1e-12 * at.value);
-  EXPECT_LT((jacobian.transpose() * residuals - gradient).norm(), 1e-10 * gradient.norm());
-  // The diagonal is raised by 1e-12 so that a variable without effect does no harm.
-  EXPECT_LT((jacobian.transpose() * jacobian - hessian).norm(), 1e-11 * hessian.norm());
+  EXPECT_LT((jacobian.transpose() * residuals - gradient).norm(), 1e-9 * gradient.norm());
+  // Newton's matrix where a sum of squares can have it, that of reweighted squares elsewhere; the
+  // diagonal is raised by 1e-12 so that a variable without effect does no harm.
+  const MatrixXd newton = objective.evaluate(x, Curvature::newton).hessian(free, free);
+  const double reached = gradient.dot(newton.ldlt().solve(gradient));
+  const MatrixXd expected = reached <= at.value ? newton : hessian;
+  EXPECT_LT((jacobian.transpose() * jacobian - expected).norm(), 1e-11 * expected.norm());
 }
 
-TEST(CompressedCost, ContinuesFlatBeyondABound) {
+TEST(CompressedCost, CutsAStepAtTheBoundThatItMeets) {
   const FitOptions options;
   const Samples samples = subsample(all_samples(table(), options), 2000);
   const Variables variables(options.kind, true, false);
   const Objective objective(samples, variables, Norm::l1, 0.1, 1);
-  VectorXd x = inside(variables);
-  x[variables.interpolation()] = 1;
+  const VectorXd x = inside(variables);  // alpha = 0.4
   const Monitor monitor;
-  const CompressedCost cost(objective, {variables.interpolation()}, x, monitor);
-  const double beyond = 1.3;
-  const double* parameters[] = {&beyond};
-  double jacobian[2];
-  double* jacobians[] = {jacobian};
-  VectorXd residuals(2);
-  ASSERT_TRUE(cost.Evaluate(parameters, residuals.data(), jacobians));
-  EXPECT_DOUBLE_EQ(residuals.squaredNorm(), objective.evaluate(x).value);
-  EXPECT_EQ(jacobian[0] * residuals[0], 0);
+  const CompressedCost cost(objective, {3, variables.interpolation()}, x, monitor);
+  const double beyond[] = {x[3] + 2, 1.6};
+  EXPECT_TRUE(cost.left_bounds(beyond));
+  VectorXd expected = x;
+  expected[3] += 1;
+  expected[variables.interpolation()] = 1;
+  EXPECT_LT((cost.within_bounds(beyond) - expected).norm(), 1e-12);
+  EXPECT_EQ(cost.within_bounds(beyond)[variables.interpolation()], 1);
+  const double* parameters[] = {beyond};
+  VectorXd residuals(3);
+  ASSERT_TRUE(cost.Evaluate(parameters, residuals.data(), nullptr));
+  EXPECT_NEAR(residuals.squaredNorm(), objective.evaluate(expected).value,
+              1e-9 * residuals.squaredNorm());
+  const double inside_bounds[] = {x[3] + 2, 0.9};
+  EXPECT_FALSE(cost.left_bounds(inside_bounds));
 }
 
 TEST(Samples, KeepBothMeasuredValuesOfAPair) {
