@@ -13,23 +13,35 @@ KINDS = ("live", "principled")
 
 
 def build_material(record: Any, kind: str = "live", name: str | None = None) -> bpy.types.Material:
-    """A material for a `lobefit.Record`, called `name` or like the record.
+    """A new material for a `lobefit.Record`, called `name` or like the record.
+
+    Raises ValueError for another kind than those in KINDS.
+    """
+    _check(kind)
+    material = bpy.data.materials.new(record.name if name is None else name)
+    fill_material(material, record, kind)
+    return material
+
+
+def fill_material(material: bpy.types.Material, record: Any, kind: str = "live") -> None:
+    """Replaces the material's nodes by those of a record, and keeps everything else of it.
 
     Its output for all renderers is the record's best Principled BSDF, which EEVEE, the viewport and
     the exporters show. With the kind `live` Cycles has an output of its own, the group 'Lobefit
-    Live'. The record goes along as JSON in the custom property `lobefit_record`. Raises ValueError
-    for another kind.
+    Live'. The record goes along as JSON in the custom property `lobefit_record`.
     """
-    if kind not in KINDS:
-        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, found '{kind}'.")
-    material = bpy.data.materials.new(record.name if name is None else name)
+    _check(kind)
     tree = empty_shader_tree(material)
     principled = principled_node(tree, record.principled, location=(0.0, 0.0))
     _add_output(tree, "ALL", principled.outputs[0], (500.0, 0.0)).is_active_output = True
     if kind == "live":
         _add_output(tree, "CYCLES", _add_live(tree, record.parameters), (500.0, 300.0))
     material[KEY] = record.to_json()
-    return material
+
+
+def _check(kind: str) -> None:
+    if kind not in KINDS:
+        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, found '{kind}'.")
 
 
 def _add_live(tree: bpy.types.NodeTree, parameters: dict[str, Any]) -> bpy.types.NodeSocket:

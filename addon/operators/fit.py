@@ -5,7 +5,7 @@ from typing import ClassVar
 import bpy
 
 from ..jobs import Outcome
-from ..nodes.material import build_material
+from ..nodes.material import fill_material
 from ..records import active_material, record_of
 from .run import RunsFits, current
 
@@ -43,12 +43,7 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
         if not found:
             return "The material was removed while its fit was under way."
-        old = found[0]
-        name, fake_user = old.name, old.use_fake_user
-        new = build_material(done[0].record)
-        old.user_remap(new)
-        bpy.data.materials.remove(old)
-        new.name, new.use_fake_user = name, fake_user
+        fill_material(found[0], done[0].record)
         return ""
 
 

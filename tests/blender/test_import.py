@@ -92,14 +92,16 @@ def test_no_file_chosen(addon):
         bpy.ops.lobefit.import_measured()
 
 
-def test_fit_anew_keeps_the_name_and_the_users(addon, material):
+def test_fit_anew_keeps_the_material(addon, material):
+    material["note"] = "kept"
     mesh = bpy.data.meshes.new("user")
     mesh.materials.append(material)
     name = material.name
     with bpy.context.temp_override(material=material):
         assert bpy.ops.lobefit.fit(model="modified-blinn-phong") == {"FINISHED"}
     (fitted,) = bpy.data.materials
-    assert mesh.materials[0] == fitted and fitted.name == name
+    assert mesh.materials[0] == fitted == material and fitted.name == name
+    assert fitted["note"] == "kept"
     assert json.loads(fitted["lobefit_record"])["model"] == "modified-blinn-phong"
 
 
