@@ -1,9 +1,9 @@
-"""The live node group against its formula: ./dev bench live_lobe --judge JUDGE.py [--python PYTHON ..]
+"""The live node group against its formula: ./dev bench live_lobe --judge JUDGE.py [--python ..]
 
-Renders the group for exponents 5 to 5000, interpolations 0, .5, 1, without Fresnel and with IOR 1.5,
-and prints sphere errors (JUDGE.py FILE.blend MATERIAL --lobe PARAMETERS --json OUT) as a table. Each
-further PYTHON (an interpreter with another bpy) renders the same file; the largest difference of its
-figures is printed.
+Renders the group for exponents 5 to 5000, interpolations 0, .5, 1, without Fresnel and with IOR
+1.5, and prints sphere errors (JUDGE.py FILE.blend MATERIAL --lobe PARAMETERS --json OUT) as a
+table. Each further --python (an interpreter with another bpy) renders the same file; the largest
+difference of its figures is printed.
 """
 
 import argparse
