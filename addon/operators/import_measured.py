@@ -17,7 +17,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
     """Fit measured reflectance files and make a material of each"""
 
     bl_idname = "lobefit.import_measured"
-    bl_label = "Import Measured BRDF"
+    bl_label = "Import BRDF"
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
     filename_ext = ".binary"

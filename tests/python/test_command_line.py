@@ -207,8 +207,12 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path, table):
     for index in range(20):
         (tmp_path / f"{index}.binary").symlink_to(table)
     command = [sys.executable, "-m", "lobefit", "fit", str(tmp_path)]
+    # A runner in the background of a shell ignores Ctrl-C, and so would what it starts.
     process = subprocess.Popen(
-        [*command, "-o", str(tmp_path / "out")], stderr=subprocess.PIPE, stdout=subprocess.PIPE
+        [*command, "-o", str(tmp_path / "out")],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not os.listdir(tmp_path / "out"):
         time.sleep(0.05)
