@@ -2,7 +2,7 @@
 
 import textwrap
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import bpy
 
@@ -14,33 +14,61 @@ from .operators.run import current
 from .properties import MODELS, draw_fit_options
 from .records import active_material, record_of
 
+TITLE = "Measured BRDF"
 # Up to which part of the reflected light that is off, what to call a fit.
 _JUDGEMENTS = ((0.05, "Very close"), (0.15, "Close"), (0.3, "Recognisable"), (1e9, "Far off"))
 
 
-class LOBEFIT_PT_measured_brdf(bpy.types.Panel):
-    """Where a material comes from, how close it is, and how to fit it anew"""
-
-    bl_label = "Measured BRDF"
+class _MaterialPanel:
+    bl_label = TITLE
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "material"
 
+
+class LOBEFIT_PT_measured_brdf(_MaterialPanel, bpy.types.Panel):
+    """Where a material comes from, how close it is, and how to fit it anew"""
+
+    # Panels without a header stand above all others; this one brings its own.
+    bl_options: ClassVar = {"HIDE_HEADER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return record_of(active_material(context)) is not None
+
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        characters = _characters(context)
-        if native.problem():
-            _paragraph(layout, native.problem(), "ERROR", characters)
+        header, body = self.layout.panel(type(self).__name__)
+        header.label(text=TITLE)
+        if body is None:
+            return
         material = active_material(context)
         record = record_of(material)
+        _draw_problem(body, context)
         if current():
-            draw_progress(layout)
-        elif record is None:
-            _draw_hint(layout, material, characters)
-        if record is not None:
-            _draw_record(layout, record, characters)
-            _draw_fit(layout, context)
-            _draw_preview(layout, material)
+            draw_progress(body)
+        _draw_record(body, record, _characters(context))
+        _draw_fit(body, context)
+        _draw_preview(body, material)
+
+
+class LOBEFIT_PT_import_measured(_MaterialPanel, bpy.types.Panel):
+    """The way to a measured material, shown where there is none"""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return not LOBEFIT_PT_measured_brdf.poll(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_problem(self.layout, context)
+        if current():
+            draw_progress(self.layout)
+        else:
+            _draw_hint(self.layout, active_material(context), _characters(context))
+
+
+def _draw_problem(layout: Any, context: bpy.types.Context) -> None:
+    if native.problem():
+        _paragraph(layout, native.problem(), "ERROR", _characters(context))
 
 
 def draw_progress(layout: Any) -> None:
@@ -129,9 +157,11 @@ def _characters(context: bpy.types.Context) -> int:
 
 def register() -> None:
     bpy.utils.register_class(LOBEFIT_PT_measured_brdf)
+    bpy.utils.register_class(LOBEFIT_PT_import_measured)
     bpy.types.STATUSBAR_HT_header.append(_draw_status)
 
 
 def unregister() -> None:
     bpy.types.STATUSBAR_HT_header.remove(_draw_status)
+    bpy.utils.unregister_class(LOBEFIT_PT_import_measured)
     bpy.utils.unregister_class(LOBEFIT_PT_measured_brdf)

@@ -24,6 +24,9 @@ class Recorder:
 
     row = column = split = box = _nested
 
+    def panel(self, _idname):
+        return self, self
+
     def label(self, text="", icon="NONE"):
         assert icon in self.icons
         self.texts.append(text)
@@ -48,11 +51,16 @@ class Recorder:
 
 
 def draw_panel(**context):
-    """The panel of the Material tab, drawn with these members in the context."""
+    """The panel that the Material tab shows with these members in the context, drawn."""
     layout = Recorder()
+    panels = [bpy.types.LOBEFIT_PT_measured_brdf, bpy.types.LOBEFIT_PT_import_measured]
     with bpy.context.temp_override(**context):
-        panel = bpy.types.LOBEFIT_PT_measured_brdf
-        panel.draw(SimpleNamespace(layout=layout), bpy.context)
+        (shown,) = [panel for panel in panels if panel.poll(bpy.context)]
+
+        class Drawn(SimpleNamespace):
+            draw = shown.draw
+
+        Drawn(layout=layout).draw(bpy.context)
     return layout
 
 
