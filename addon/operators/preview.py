@@ -10,7 +10,7 @@ from .. import native
 from ..records import KEY, active_material, record_of
 
 IMAGE = "Lobefit Preview"
-COLUMNS = {"measured": "Measured", "cycles": "As in Cycles", "difference": "Difference x4"}
+COLUMNS = {"measured": "Measured", "cycles": "As in Cycles", "difference": "Error x4"}
 _SIZE = 160  # pixels a sphere
 
 _icons: Any = None  # the spheres of the panel, by their material and column

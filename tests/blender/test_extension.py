@@ -126,7 +126,7 @@ def test_panel_shows_the_preview(addon, material):
         assert bpy.ops.lobefit.preview() == {"FINISHED"}
     image = bpy.data.images["Lobefit Preview"]
     assert image.size[0] == 3 * image.size[1]
-    titles = ["Measured", "As in Cycles", f"Difference x{lobefit.preview.AMPLIFIED}"]
+    titles = ["Measured", "As in Cycles", f"Error x{lobefit.preview.AMPLIFIED}"]
     assert draw_panel(material=material).texts[-3:] == titles
     assert titles[0] not in draw_panel(material=bpy.data.materials.new("other")).texts
 

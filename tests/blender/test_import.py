@@ -63,21 +63,31 @@ def test_several_files_of_which_one_is_bad(addon, measured_file, tmp_path):
     assert len(bpy.data.materials) == 1
 
 
+VALUES = 3 * 90 * 90 * 180
 BAD_FILES = {
     "empty": b"",
     "text": b"this is no measurement" * 100,
     "dimensions": struct.pack("<3i", 90, 90, 7) + bytes(8 * 3 * 90 * 90 * 7),
+    "permuted": struct.pack("<3i", 90, 180, 90) + bytes(8 * VALUES),
+    "negative": struct.pack("<3i", -90, -90, 180) + bytes(8 * VALUES),
+    "big_endian": struct.pack(">3i", 90, 90, 180) + bytes(8 * VALUES),
     "truncated": struct.pack("<3i", 90, 90, 180) + bytes(1000),
+    "too_long": struct.pack("<3i", 90, 90, 180) + bytes(8 * VALUES + 8),
+    "invalid": struct.pack("<3i", 90, 90, 180) + struct.pack("<d", -1.0) * VALUES,
+    "nan": struct.pack("<3i", 90, 90, 180) + struct.pack("<d", float("nan")) * VALUES,
 }
 
 
-@pytest.mark.parametrize("kind", [*BAD_FILES, "missing", "folder"])
+@pytest.mark.parametrize("kind", [*BAD_FILES, "missing", "folder", "suffix"])
 def test_bad_input_changes_nothing(addon, tmp_path, kind):
     path = tmp_path / f"{kind}.binary"
     if kind in BAD_FILES:
         path.write_bytes(BAD_FILES[kind])
     elif kind == "folder":
         path.mkdir()
+    elif kind == "suffix":
+        path = tmp_path / "table.brdf"
+        path.write_bytes(b"something")
     with pytest.raises(lobefit.InputError) as native:
         lobefit.read(str(path))
     before = data_blocks()
