@@ -57,7 +57,7 @@ class RunsFits(FitOptions):
 
     def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
         """Changes the data-blocks; returns a sentence instead when they are no longer there."""
-        raise NotImplementedError
+        raise TypeError(f"{type(self).__name__} does not say what becomes of its fits")
 
     def fit(self, context: bpy.types.Context, paths: Sequence[str]) -> set[str]:
         """Fits the files: in the background of a window, or waiting where nobody looks on."""

@@ -8,8 +8,8 @@ namespace lobefit {
 // What a run is compared with. Everything is in units of the median reflectance.
 struct KernelInput {
   std::size_t count;  // a multiple of Samples::padding
-  const float* u_phong;
-  const float* u_blinn;
+  const double* u_phong;
+  const double* u_blinn;
   const float* weight;
   int channels;                 // 1 to 3, all with the same exponent
   const float* measured[3][2];  // [channel][half]

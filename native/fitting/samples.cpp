@@ -28,12 +28,26 @@ double typical_reflectance(const Measurement& measurement) {
   return sum > 0 ? sum / static_cast<double>(values.size()) : 1;
 }
 
-// Every column, as pointers; const when the samples are.
-template <typename AnySamples>
-auto columns(AnySamples& s) {
-  return std::array<decltype(&s.u_phong), 9>{
-      &s.u_phong,        &s.u_blinn,        &s.weight,         &s.measured[0][0], &s.measured[0][1],
-      &s.measured[1][0], &s.measured[1][1], &s.measured[2][0], &s.measured[2][1]};
+// Calls visit(column) for every column; columns differ in type.
+template <typename Visit>
+void for_each_column(Samples& s, const Visit& visit) {
+  visit(s.u_phong);
+  visit(s.u_blinn);
+  visit(s.weight);
+  for (auto& channel : s.measured) {
+    for (auto& half : channel) visit(half);
+  }
+}
+
+void append(Samples& to, const Samples& from, std::size_t i) {
+  to.u_phong.push_back(from.u_phong[i]);
+  to.u_blinn.push_back(from.u_blinn[i]);
+  to.weight.push_back(from.weight[i]);
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t half = 0; half < 2; ++half) {
+      to.measured[c][half].push_back(from.measured[c][half][i]);
+    }
+  }
 }
 
 void begin_run(Samples& samples, double cos_theta_d) {
@@ -43,7 +57,7 @@ void begin_run(Samples& samples, double cos_theta_d) {
 void end_run(Samples& samples) {
   const std::size_t padded =
       (samples.size() + Samples::padding - 1) / Samples::padding * Samples::padding;
-  for (auto* column : columns(samples)) column->resize(padded, 0.0F);
+  for_each_column(samples, [padded](auto& column) { column.resize(padded); });
   samples.runs.back().end = padded;
   if (samples.runs.back().begin == padded) samples.runs.pop_back();
 }
@@ -56,7 +70,7 @@ class Builder {
         min_cosine_(std::cos(radians(std::min(options.max_angle_degrees, 90.0)))) {
     samples_.unit = typical_reflectance(measurement);
     const auto expected = static_cast<std::size_t>(measurement.bins().valid) / 2;
-    for (auto* column : columns(samples_)) column->reserve(expected);
+    for_each_column(samples_, [expected](auto& column) { column.reserve(expected); });
   }
 
   Samples build() {
@@ -80,8 +94,8 @@ class Builder {
     const double cos_i = directions.wi.z(), cos_o = directions.wo.z();
     if (std::min(cos_i, cos_o) <= min_cosine_) return;
     const LobeCoordinates at = lobe_coordinates(centre);
-    samples_.u_phong.push_back(static_cast<float>(at.u_phong));
-    samples_.u_blinn.push_back(static_cast<float>(at.u_blinn));
+    samples_.u_phong.push_back(at.u_phong);
+    samples_.u_blinn.push_back(at.u_blinn);
     double weight = first && second ? 1 : 0.5;
     if (norm_ == Norm::cosine_l1) weight *= solid_angle_and_cosines(h, centre, cos_i * cos_o);
     samples_.weight.push_back(static_cast<float>(weight));
@@ -134,8 +148,6 @@ Samples subsample(const Samples& all, std::size_t count) {
   const double even = 0.1 * sum / static_cast<double>(std::max<std::size_t>(all.size(), 1));
   Samples drawn;
   drawn.unit = all.unit;
-  const auto from = columns(all);
-  const auto to = columns(drawn);
   const double per_draw = 1.1 * sum / static_cast<double>(count);
   double until_next = 0.5;
   for (const Samples::Run& run : all.runs) {
@@ -147,9 +159,7 @@ Samples subsample(const Samples& all, std::size_t count) {
       if (until_next >= 0) continue;
       const double draws = std::ceil(-until_next);
       until_next += draws;
-      for (std::size_t column = 0; column < from.size(); ++column) {
-        to[column]->push_back((*from[column])[i]);
-      }
+      append(drawn, all, i);
       drawn.weight.back() = static_cast<float>(all.weight[i] * draws / expected);
     }
     end_run(drawn);

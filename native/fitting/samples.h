@@ -27,8 +27,9 @@ struct Samples {
   };
 
   std::vector<Run> runs;
-  std::vector<float> u_phong, u_blinn;  // lobe_coordinates
-  std::vector<float> weight;            // of each of the two measured values
+  // lobe_coordinates; in double, because 1 - u counts where u is close to 1.
+  std::vector<double> u_phong, u_blinn;
+  std::vector<float> weight;  // of each of the two measured values
   // measured[channel][half]: f, or log(f + log_offset) for Norm::log_l2.
   std::array<std::array<std::vector<float>, 2>, 3> measured;
   double unit = 1;  // the median reflectance, in 1/sr

@@ -59,8 +59,8 @@ class EveryObjective : public ::testing::TestWithParam<Case> {
   double model(const VectorXd& x, std::size_t i, double cos_theta_d, int channel) const {
     const Parameters p = as_interpolated(variables_.to_parameters(x, 1));
     const double fresnel = p.ior ? fresnel_reflectance(cos_theta_d, *p.ior).value : 1;
-    const double u = (1 - p.interpolation) * static_cast<double>(samples_.u_phong[i]) +
-                     p.interpolation * static_cast<double>(samples_.u_blinn[i]);
+    const double u =
+        (1 - p.interpolation) * samples_.u_phong[i] + p.interpolation * samples_.u_blinn[i];
     const double lobe = u < 1 ? std::pow(1 - u, p.exponent[channel]) : 0;
     const double value = p.diffuse[channel] / pi + p.specular[channel] * fresnel * lobe;
     return GetParam().norm == Norm::log_l2 ? std::log(value + log_offset) : value;
