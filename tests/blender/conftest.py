@@ -8,6 +8,7 @@ import importlib
 import json
 import os
 import shutil
+import sys
 import tempfile
 import zipfile
 from pathlib import Path
@@ -16,6 +17,7 @@ from types import ModuleType
 import pytest
 
 EXTENSION = "bl_ext.user_default.lobefit"
+EXIT_STATUS = pytest.StashKey[int]()
 root = Path(__file__).resolve().parents[2]
 profile = Path(tempfile.mkdtemp(prefix="lobefit-profile-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(profile)
@@ -52,9 +54,21 @@ def pytest_sessionstart() -> None:
     assert lobefit._native.build_id == build["build_id"]
 
 
-def pytest_unconfigure() -> None:
-    """Removes the profile."""
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Disables the extension, as Blender does when it quits, and removes the profile."""
+    bpy.ops.preferences.addon_disable(module=EXTENSION)
     shutil.rmtree(profile, ignore_errors=True)
+    if bpy.app.version < (4, 3):
+        # The bpy 4.2 wheel crashes when Python ends after its own glTF exporter has run, on the
+        # default cube without any extension too, and the tests' verdict would be lost.
+        sys.stdout.flush()
+        os._exit(config.stash[EXIT_STATUS])
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Keeps the verdict for the end."""
+    session.config.stash[EXIT_STATUS] = int(exitstatus)
 
 
 @pytest.fixture(autouse=True)
