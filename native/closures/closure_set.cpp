@@ -1,0 +1,49 @@
+#include "closures/closure_set.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace lobefit {
+namespace {
+
+Rgb at(const RgbCurve& curve, double cosine) {
+  return {curve[0](cosine), curve[1](cosine), curve[2](cosine)};
+}
+
+}  // namespace
+
+ClosureSockets to_sockets(const Shape& shape, double sine) {
+  const double ratio = std::exp((shape.log_alpha_x - shape.log_alpha_y) / 2);
+  return {std::exp((shape.log_alpha_x + shape.log_alpha_y) / 4),
+          ratio <= 1 ? 1 - ratio : 1 / ratio - 1, sine > 0 ? shape.tilt / sine : 0};
+}
+
+Shape to_shape(const ClosureSockets& sockets, double sine) {
+  const double log_alpha = 2 * std::log(std::clamp(sockets.roughness, 1e-6, 1.0));
+  const double anisotropy = std::clamp(sockets.anisotropy, -0.99, 0.99);
+  const double half_ratio = -std::copysign(std::log1p(-std::abs(anisotropy)), anisotropy);
+  return {std::min(log_alpha + half_ratio, 0.0), std::min(log_alpha - half_ratio, 0.0),
+          sockets.bend * sine};
+}
+
+Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo) {
+  if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
+  const double cosine = wo.z(), sine = std::hypot(wo.x(), wo.y());
+  // Turned about the normal so that the viewer is in the xz plane.
+  const double c = sine > 0 ? wo.x() / sine : 1, s = sine > 0 ? wo.y() / sine : 0;
+  const Vector3 light(c * wi.x() + s * wi.y(), c * wi.y() - s * wi.x(), wi.z());
+  const Vector3 viewer(sine, 0, cosine);
+  const Vector3 half = (light + viewer).normalized();
+  Rgb result = at(closures.diffuse, cosine) * (wi.z() / pi);
+  for (const SpecularClosure& specular : closures.specular) {
+    const Shape shape = to_shape({specular.roughness(cosine), specular.anisotropy(cosine),
+                                  specular.bend(cosine)},
+                                 sine);
+    result += at(specular.weight, cosine) *
+              Microfacet(specular.distribution, shape, viewer).evaluate(light, half);
+  }
+  return result;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,45 @@
+// A few Cycles closures whose parameters depend on the view: what a baked node group renders.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "closures/microfacet.h"
+#include "closures/view_curve.h"
+#include "reflectance/reflectance.h"
+
+namespace lobefit {
+
+using RgbCurve = std::array<ViewCurve, 3>;
+
+// One GGX or Beckmann closure, in the terms of its node: Roughness and Anisotropy with the tangent
+// in the plane of incidence, and the closure's normal n + bend (wo - (n.wo) n), not normalised.
+struct SpecularClosure {
+  Distribution distribution = Distribution::ggx;
+  ViewCurve roughness, anisotropy, bend;
+  RgbCurve weight;
+};
+
+// The sum of a diffuse closure and some specular ones, each times its weight.
+struct ClosureSet {
+  RgbCurve diffuse;
+  std::vector<SpecularClosure> specular;
+};
+
+// Cycles' sockets of a shape seen at some angle whose sine is given, and back. Roughness is
+// sqrt(alpha), Anisotropy 1 - sqrt(alpha_x / alpha_y) or its negative counterpart; where one alpha
+// would exceed 1, Cycles clips it.
+struct ClosureSockets {
+  double roughness;
+  double anisotropy;
+  double bend;
+};
+ClosureSockets to_sockets(const Shape& shape, double sine);
+Shape to_shape(const ClosureSockets& sockets, double sine);
+
+// f cos(theta_i) in 1/sr, as Cycles 4.2 and later evaluate it, for unit vectors toward the light
+// (wi) and the viewer (wo), n = +z; 0 below the horizon.
+Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo);
+
+}  // namespace lobefit

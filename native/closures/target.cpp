@@ -1,0 +1,134 @@
+#include "closures/target.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace lobefit {
+namespace {
+
+constexpr int views = 36, rings = 40, sectors = 14;
+// sqrt(cos theta) of the views: evenly spaced, so that they crowd at grazing angles, where
+// reflectance changes fastest.
+constexpr double least_root = 0.15;
+// Views flatter than this are a hundredth of a sphere's picture, but can be so bright, or measured
+// so badly, that they would rule all others.
+constexpr double least_picture_cosine = 0.1;
+// What is darker is black and what is brighter could make sums infinite; no reflectance comes near.
+constexpr double darkest = 1e-12, brightest = 1e30;
+
+// The sum of an amount over all samples at about one angle p between light and viewer, as a function
+// of p: hats of 5 degrees, constant beyond the first and the last, where pictures hold next to
+// nothing.
+class SumByPhase {
+ public:
+  static constexpr std::size_t count = 33;
+  void add(double cosine, double amount) {
+    const auto [below, share] = place(cosine);
+    sums_[below] += (1 - share) * amount;
+    sums_[below + 1] += share * amount;
+  }
+  double operator()(double cosine) const {
+    const auto [below, share] = place(cosine);
+    return (1 - share) * sums_[below] + share * sums_[below + 1];
+  }
+
+ private:
+  static constexpr double step = 5, first = 5, last = 165;
+  static std::pair<std::size_t, double> place(double cosine) {
+    const double phase = degrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
+    const double at = (std::clamp(phase, first, last) - first) / step;
+    const auto below = std::min(static_cast<std::size_t>(at), count - 2);
+    return {below, at - static_cast<double>(below)};
+  }
+  std::array<double, count> sums_{};
+};
+
+// The share of a sphere's picture, 2 cos d(cos), that one of the views stands for.
+double picture_share(double cosine) {
+  return 4 * cosine * std::sqrt(cosine) * (1 - least_root) / views;
+}
+
+// Half vectors on rings that crowd toward the normal as the square of their number, where the
+// highlight is; the offset keeps the rings of neighbouring views from repeating each other.
+TargetView sample_view(const Reflectance& f, const Vector3& wo, double share, double offset) {
+  TargetView view{wo, {}};
+  for (int ring = 0; ring < rings; ++ring) {
+    const double t = (ring + offset) / rings;
+    const double theta_h = t * t * (pi / 2), width = t * pi / rings;
+    const double sin_h = std::sin(theta_h), cos_h = std::cos(theta_h);
+    for (int sector = 0; sector < sectors; ++sector) {
+      // A quarter of a step off, no azimuth is the mirror image of another.
+      const double phi = (sector + 0.25) * (2 * pi / sectors);
+      const Vector3 half(sin_h * std::cos(phi), sin_h * std::sin(phi), cos_h);
+      const double incidence = wo.dot(half);
+      const Vector3 wi = 2 * incidence * half - wo;
+      if (!(incidence > 0 && wi.z() > 0)) continue;
+      const Rgb value = f(wi, wo) * wi.z();
+      if (!value.isFinite().all()) continue;
+      const double solid_angle = 4 * incidence * sin_h * width * (2 * pi / sectors);
+      const double sin_phase = std::sqrt(std::max(0.0, 1 - wi.dot(wo) * wi.dot(wo)));
+      view.lights.push_back({wi, half, value.cwiseMin(brightest).cwiseMax(0), solid_angle,
+                             share * solid_angle / std::max(sin_phase, 0.05), 0});
+    }
+  }
+  return view;
+}
+
+}  // namespace
+
+Target sample_target(const Reflectance& f) {
+  constexpr double golden = 0.6180339887498949;
+  Target target;
+  SumByPhase light, weight;
+  double all_light = 0, all_weight = 0;
+  for (int i = 0; i < views; ++i) {
+    const double root = least_root + (1 - least_root) * (i + 0.5) / views;
+    const double cosine = root * root;
+    const Vector3 wo(std::sqrt(1 - cosine * cosine), 0, cosine);
+    const double offset = std::fmod(0.5 + golden * i, 1.0);
+    target.push_back(sample_view(f, wo, picture_share(cosine), std::max(offset, 0.02)));
+    if (cosine < least_picture_cosine) continue;
+    for (const TargetLight& at : target.back().lights) {
+      const double cos_phase = at.wi.dot(wo), reflected = at.weight * at.reflected.sum();
+      light.add(cos_phase, reflected);
+      weight.add(cos_phase, 3 * at.weight);
+      all_light += reflected;
+      all_weight += 3 * at.weight;
+    }
+  }
+  if (!(all_light > darkest * all_weight)) return {};
+  const double mean_light = all_light / SumByPhase::count;
+  double error_of_black = 0;
+  for (TargetView& view : target) {
+    double view_light = 0;
+    for (TargetLight& at : view.lights) {
+      const double cos_phase = at.wi.dot(view.wo);
+      // A phase that is all but black weighs as one with a ten-thousandth of the mean light.
+      const double at_phase = std::max(light(cos_phase), 1e-4 * mean_light);
+      at.typical = at_phase / std::max(weight(cos_phase), 1e-30);
+      at.weight /= at_phase * SumByPhase::count;
+      view_light += at.weight * at.reflected.sum();
+    }
+    const double most = view.wo.z() < least_picture_cosine ? picture_share(view.wo.z()) : 1;
+    for (TargetLight& at : view.lights) at.weight *= std::min(1.0, most / view_light);
+    error_of_black += std::min(view_light, most);
+  }
+  for (TargetView& view : target) {
+    for (TargetLight& at : view.lights) at.weight /= error_of_black;
+  }
+  std::erase_if(target, [](const TargetView& view) { return view.lights.empty(); });
+  return target;
+}
+
+double error_of(const Target& target, const Reflectance& f_times_cosine) {
+  double error = 0;
+  for (const TargetView& view : target) {
+    for (const TargetLight& at : view.lights) {
+      error += at.weight * (f_times_cosine(at.wi, view.wo) - at.reflected).abs().sum();
+    }
+  }
+  return error;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,43 @@
+// A reflectance as closures and Principled BSDFs are fitted to it.
+#pragma once
+
+#include <vector>
+
+#include "reflectance/reflectance.h"
+
+namespace lobefit {
+
+// A light, the unit half vector of it and the viewer, what the target reflects (f cos), the solid
+// angle that the light stands for, what a difference of 1 in one channel adds to the error, and the
+// mean of the target's channels at about the same angle between light and viewer.
+struct TargetLight {
+  Vector3 wi;
+  Vector3 half;
+  Rgb reflected;
+  double solid_angle;
+  double weight;
+  double typical;
+};
+
+// A view angle and the lights of the whole hemisphere that the target is known for. Both sides of
+// the plane of incidence count: the halves of a measurement differ.
+struct TargetView {
+  Vector3 wo;  // in the xz plane, x > 0
+  std::vector<TargetLight> lights;
+};
+
+// The error of an approximation is sum weight |approximation - reflected| over views, lights and
+// channels: the mean over all angles p between light and viewer of the relative L1 difference of
+// pictures of a sphere, so that every p counts alike, with no p singled out. In a picture a view
+// angle takes cos theta d(cos theta), and lights at p are spread as d wi / sin p. Black has the
+// error 1.
+using Target = std::vector<TargetView>;
+
+// Samples f (1/sr, without the cosine; NaN where it is not known). Empty for a target that is
+// black or nowhere known.
+Target sample_target(const Reflectance& f);
+
+// sum weight |approximation - reflected|, for f cos of an approximation in the same frame.
+double error_of(const Target& target, const Reflectance& f_times_cosine);
+
+}  // namespace lobefit

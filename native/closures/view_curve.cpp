@@ -1,0 +1,85 @@
+#include "closures/view_curve.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lobefit {
+namespace {
+
+constexpr int entries = 256;
+
+// Marks the points needed between two that are kept, by the one that is farthest off the line.
+void keep_needed(const std::vector<ViewCurve::Point>& all, std::size_t from, std::size_t to,
+                 double tolerance, std::vector<bool>& kept) {
+  double worst = tolerance;
+  std::size_t farthest = 0;
+  for (std::size_t i = from + 1; i < to; ++i) {
+    const double share = (all[i].cosine - all[from].cosine) / (all[to].cosine - all[from].cosine);
+    const double off = std::abs(all[from].value + share * (all[to].value - all[from].value) -
+                                all[i].value);
+    if (off > worst) {
+      worst = off;
+      farthest = i;
+    }
+  }
+  if (farthest == 0) return;
+  kept[farthest] = true;
+  keep_needed(all, from, farthest, tolerance, kept);
+  keep_needed(all, farthest, to, tolerance, kept);
+}
+
+}  // namespace
+
+double ViewCurve::operator()(double cosine) const {
+  const auto above = std::find_if(points_.begin(), points_.end(),
+                                  [=](const Point& point) { return point.cosine >= cosine; });
+  if (above == points_.begin()) return above->value;
+  if (above == points_.end()) return points_.back().value;
+  const Point &low = above[-1], &high = *above;
+  const double share = (cosine - low.cosine) / (high.cosine - low.cosine);
+  return low.value + share * (high.value - low.value);
+}
+
+ViewCurve ViewCurve::following(const std::function<double(double)>& function, double tolerance) {
+  std::vector<Point> all;
+  for (int i = 0; i < entries; ++i) {
+    const double cosine = double(i) / (entries - 1);
+    all.push_back({cosine, function(cosine)});
+  }
+  const auto [least, greatest] = std::minmax_element(
+      all.begin(), all.end(), [](const Point& a, const Point& b) { return a.value < b.value; });
+  if (greatest->value - least->value <= 2 * tolerance) {
+    return ViewCurve((least->value + greatest->value) / 2);
+  }
+  std::vector<bool> kept(all.size(), false);
+  kept.front() = kept.back() = true;
+  keep_needed(all, 0, all.size() - 1, tolerance, kept);
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (kept[i]) points.push_back(all[i]);
+  }
+  return ViewCurve(std::move(points));
+}
+
+ViewSplines::Support ViewSplines::at(double cosine) {
+  constexpr int intervals = count - 3;
+  const double root = std::sqrt(std::clamp(cosine, 0.0, 1.0));
+  const double place =
+      intervals * std::clamp((root - least_root) / (1 - least_root), 0.0, 1.0);
+  const int first = std::min(static_cast<int>(place), intervals - 1);
+  const double t = place - first, u = 1 - t;
+  return {first,
+          {u * u * u / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * u * u * u - 6 * u * u + 4) / 6,
+           t * t * t / 6}};
+}
+
+double ViewSplines::evaluate(const double* coefficients, double cosine) {
+  const Support support = at(cosine);
+  double value = 0;
+  for (int i = 0; i < 4; ++i) {
+    value += support.share[static_cast<std::size_t>(i)] * coefficients[support.first + i];
+  }
+  return value;
+}
+
+}  // namespace lobefit
