@@ -6,6 +6,8 @@ from typing import Any
 import bpy
 
 KEY = "lobefit_record"
+# What the material shows: its kind and the number of its specular closures.
+KIND_KEY, COUNT_KEY = "lobefit_kind", "lobefit_closures"
 
 
 def active_material(context: bpy.types.Context) -> bpy.types.Material | None:

@@ -1,47 +1,136 @@
 """A record as a Blender material."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
-from ..records import KEY
+from ..records import COUNT_KEY, KEY, KIND_KEY
+from .baked import baked_group
 from .live import live_group, live_inputs
 from .principled import principled_node
 from .tree import empty_shader_tree
 
-KINDS = ("live", "principled")
+KINDS = ("live", "lobe", "measured", "principled", "auto")
+# Whose closures in a record each baked kind shows.
+BAKED = ("lobe", "measured")
+# Up to which part of the light that is off `auto` takes a kind, if nothing else is asked for.
+TOLERANCE = 0.05
 
 
-def build_material(record: Any, kind: str = "live", name: str | None = None) -> bpy.types.Material:
-    """A new material for a `lobefit.Record`, called `name` or like the record.
+def build_material(
+    record: Any,
+    kind: str = "live",
+    name: str | None = None,
+    count: int | None = None,
+    tolerance: float = TOLERANCE,
+) -> bpy.types.Material:
+    """A new material for a `lobefit.Record`, called `name` or like the record; see fill_material.
 
-    Raises ValueError for another kind than those in KINDS.
+    Raises ValueError for another kind than those in KINDS, and for a baked kind whose closures the
+    record does not hold (`lobefit.closures` adds them).
     """
-    _check(kind)
+    choice = choose(record, kind, count, tolerance)
     material = bpy.data.materials.new(record.name if name is None else name)
-    fill_material(material, record, kind)
+    _fill(material, record, choice)
     return material
 
 
-def fill_material(material: bpy.types.Material, record: Any, kind: str = "live") -> None:
+def fill_material(
+    material: bpy.types.Material,
+    record: Any,
+    kind: str = "live",
+    count: int | None = None,
+    tolerance: float = TOLERANCE,
+) -> None:
     """Replaces the material's nodes by those of a record, and keeps everything else of it.
 
     Its output for all renderers is the record's best Principled BSDF, which EEVEE, the viewport and
-    the exporters show. With the kind `live` Cycles has an output of its own, the group 'Lobefit
-    Live'. The record goes along as JSON in the custom property `lobefit_record`.
+    the exporters show. Other kinds than `principled` give Cycles an output of its own: the group
+    'Lobefit Live', or a baked group of the fitted lobe (`lobe`) or of the measurement (`measured`)
+    with `count` specular closures (the most the record holds, if None). `auto` takes the cheapest
+    that is at most `tolerance` off. The record goes along as JSON in the custom property
+    `lobefit_record`, and what was chosen in `lobefit_kind` and `lobefit_closures`.
     """
-    _check(kind)
+    _fill(material, record, choose(record, kind, count, tolerance))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A kind that is not `auto`, and for a baked one the record's entry it shows."""
+
+    kind: str
+    closures: Mapping[str, Any] | None = None
+
+    @property
+    def count(self) -> int:
+        """How many specular closures are drawn."""
+        return 0 if self.closures is None else len(self.closures["specular"])
+
+
+def choose(
+    record: Any, kind: str, count: int | None = None, tolerance: float = TOLERANCE
+) -> Choice:
+    """What a kind stands for with this record; raises ValueError where it stands for nothing."""
+    if kind not in KINDS:
+        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, found '{kind}'.")
+    if kind == "auto":
+        return choices(record, tolerance)[0]
+    if kind not in BAKED:
+        return Choice(kind)
+    found = [
+        entry
+        for entry in record.closures
+        if entry["target"] == kind and count in (None, entry["count"])
+    ]
+    if not found:
+        many = "" if count is None else f" with {count} specular closures"
+        raise ValueError(
+            f"{record.name}: expected a record with the closures of kind '{kind}'{many}, found "
+            "none; `lobefit closures` adds them."
+        )
+    return Choice(kind, max(found, key=lambda entry: entry["count"]))
+
+
+def choices(record: Any, tolerance: float) -> list[Choice]:
+    """The ways to show the measurement, the cheapest that is within the tolerance first.
+
+    Where none is within the tolerance, the nearest is first. Cost goes by the number of closures; a
+    Principled BSDF costs about as much as two (README, "Error against run time").
+    """
+    measured = [entry for entry in record.closures if entry["target"] == "measured"]
+    ways = [(entry["error"], entry["count"], Choice("measured", entry)) for entry in measured]
+    ways.append((record.principled["error"], 2.5, Choice("principled")))
+    ways.sort(key=lambda way: (max(way[0], tolerance), way[1], way[0]))
+    return [way for _, _, way in ways]
+
+
+def _fill(material: bpy.types.Material, record: Any, choice: Choice) -> None:
     tree = empty_shader_tree(material)
     principled = principled_node(tree, record.principled, location=(0.0, 0.0))
     _add_output(tree, "ALL", principled.outputs[0], (500.0, 0.0)).is_active_output = True
-    if kind == "live":
+    if choice.kind == "live":
         _add_output(tree, "CYCLES", _add_live(tree, record.parameters), (500.0, 300.0))
+    elif choice.closures is not None:
+        shader = _add_baked(tree, f"{material.name} {choice.kind}", choice.closures)
+        _add_output(tree, "CYCLES", shader, (500.0, 300.0))
     material[KEY] = record.to_json()
+    material[KIND_KEY], material[COUNT_KEY] = choice.kind, choice.count
 
 
-def _check(kind: str) -> None:
-    if kind not in KINDS:
-        raise ValueError(f"kind: expected one of {', '.join(KINDS)}, found '{kind}'.")
+def _add_baked(
+    tree: bpy.types.NodeTree, name: str, closures: Mapping[str, Any]
+) -> bpy.types.NodeSocket:
+    # A material fitted anew replaces its own group; the same source always makes the same tree.
+    old = bpy.data.node_groups.get(name)
+    if old is not None and old.users == 0:
+        bpy.data.node_groups.remove(old)
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = baked_group(name, closures)
+    node.name = node.label = name
+    node.width, node.location = 200.0, (0.0, 300.0)
+    return node.outputs[0]
 
 
 def _add_live(tree: bpy.types.NodeTree, parameters: dict[str, Any]) -> bpy.types.NodeSocket:

@@ -109,6 +109,15 @@ class Vector(Value):
         # The factor is the fourth input of the node.
         return Vector(self.formulas, self._math("SCALE", self, None, None, factor))
 
+    def times(self, other: "Vector | tuple[float, float, float]") -> "Vector":
+        """The product of each component with that of the other."""
+        return Vector(self.formulas, self._math("MULTIPLY", self, other))
+
+    def times_plus(self, factor: Scalar | float, addend: "Vector") -> "Vector":
+        """This times a factor plus another vector, in one node."""
+        factor = (factor,) * 3 if isinstance(factor, float) else factor
+        return Vector(self.formulas, self._math("MULTIPLY_ADD", self, factor, addend))
+
     def dot(self, other: "Vector") -> Scalar:
         return Scalar(self.formulas, self._math("DOT_PRODUCT", self, other, output="Value"))
 

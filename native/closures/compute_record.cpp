@@ -45,6 +45,7 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   monitor.report("Reading", 0);
   const std::shared_ptr<const Measurement> measurement = open(source);
   contents.bins = measurement->bins();
+  contents.measurement = measurement;
   contents.read_seconds = seconds_since(start);
   contents.fit = fit_model(*measurement, options, monitor);
   monitor.report("Measuring the albedo", 0.97);

@@ -23,6 +23,7 @@ struct RecordContents {
   Fit fit;
   AlbedoByViewAngle albedo;
   Principled principled;  // fitted to the measurement
+  std::shared_ptr<const Measurement> measurement;
   double read_seconds = 0, total_seconds = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -14,7 +15,9 @@
 #include <utility>
 #include <vector>
 
+#include "closures/closure_set.h"
 #include "closures/compute_record.h"
+#include "closures/fit_closures.h"
 #include "closures/live_lobe.h"
 #include "closures/principled.h"
 #include "fitting/job.h"
@@ -33,6 +36,7 @@ namespace {
 
 using SharedMeasurement = std::shared_ptr<Measurement>;
 using RecordJob = Job<RecordContents>;
+using ClosureJob = Job<FittedClosures>;
 using DirectionArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> to_list(const Rgb& rgb) { return {rgb[0], rgb[1], rgb[2]}; }
@@ -93,6 +97,70 @@ py::dict to_dict(const Principled& principled) {
                   "metallic"_a = principled.metallic, "roughness"_a = principled.roughness,
                   "ior"_a = principled.ior, "specular_tint"_a = to_list(principled.specular_tint),
                   "error"_a = principled.error);
+}
+
+// A curve as a list of points [cosine, value], three curves as a list of curves.
+py::list to_list(const ViewCurve& curve) {
+  py::list list;
+  for (const ViewCurve::Point& point : curve.points()) {
+    list.append(std::vector<double>{point.cosine, point.value});
+  }
+  return list;
+}
+
+py::list to_list(const RgbCurve& curves) {
+  py::list list;
+  for (const ViewCurve& curve : curves) list.append(to_list(curve));
+  return list;
+}
+
+ViewCurve curve_from(const py::handle& list) {
+  std::vector<ViewCurve::Point> points;
+  for (const auto& [cosine, value] : list.cast<std::vector<std::pair<double, double>>>()) {
+    points.push_back({cosine, value});
+  }
+  if (points.empty()) throw InputError("closures: a curve needs a point.");
+  return ViewCurve(std::move(points));
+}
+
+RgbCurve curves_from(const py::handle& list) {
+  const auto curves = list.cast<std::array<py::object, 3>>();
+  return {curve_from(curves[0]), curve_from(curves[1]), curve_from(curves[2])};
+}
+
+py::dict to_dict(const FittedClosures& fitted) {
+  using namespace py::literals;
+  py::list specular, angles, target, closures, errors;
+  for (const SpecularClosure& closure : fitted.closures.specular) {
+    specular.append(py::dict("distribution"_a = std::string(name_of(closure.distribution)),
+                             "roughness"_a = to_list(closure.roughness),
+                             "anisotropy"_a = to_list(closure.anisotropy),
+                             "bend"_a = to_list(closure.bend),
+                             "weight"_a = to_list(closure.weight)));
+  }
+  for (const SeenAtAngle& seen : fitted.by_view) {
+    angles.append(degrees(std::acos(seen.cosine)));
+    target.append(to_list(seen.target_albedo));
+    closures.append(to_list(seen.closures_albedo));
+    errors.append(seen.relative_error);
+  }
+  return py::dict("error"_a = fitted.error, "diffuse"_a = to_list(fitted.closures.diffuse),
+                  "specular"_a = specular,
+                  "by_view"_a = py::dict("view_angle"_a = angles, "target_albedo"_a = target,
+                                         "closures_albedo"_a = closures,
+                                         "relative_error"_a = errors));
+}
+
+ClosureSet closures_from(const py::dict& dict) {
+  ClosureSet closures{curves_from(dict["diffuse"]), {}};
+  for (const py::handle item : dict["specular"]) {
+    const auto specular = item.cast<py::dict>();
+    closures.specular.push_back({distribution_named(specular["distribution"].cast<std::string>()),
+                                 curve_from(specular["roughness"]),
+                                 curve_from(specular["anisotropy"]), curve_from(specular["bend"]),
+                                 curves_from(specular["weight"])});
+  }
+  return closures;
 }
 
 py::dict to_dict(const BinCounts& bins) {
@@ -189,14 +257,19 @@ Reflectance principled_reflectance(const Principled& principled) {
       [=](const Vector3& wi, const Vector3& wo) { return evaluate_principled(principled, wi, wo); };
 }
 
+Reflectance closures_reflectance(const ClosureSet& closures) {
+  return
+      [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
+}
+
 Reflectance measured_reflectance(SharedMeasurement measurement) {
   return [measurement = std::move(measurement)](const Vector3& wi, const Vector3& wo) {
     return measurement->evaluate(wi, wo);
   };
 }
 
-// f cos of what a preview can show: a Measurement, a dict of parameters, ("live", parameters) or
-// ("principled", its dict).
+// f cos of what a preview can show: a Measurement, a dict of parameters, ("live", parameters),
+// ("principled", its dict) or ("closures", an entry of a record's closures).
 Reflectance previewed(const py::object& source) {
   if (py::isinstance<Measurement>(source)) {
     return with_cosine(measured_reflectance(source.cast<SharedMeasurement>()));
@@ -207,7 +280,8 @@ Reflectance previewed(const py::object& source) {
   const auto [kind, dict] = source.cast<std::pair<std::string, py::dict>>();
   if (kind == "live") return live_reflectance(parameters_from(dict));
   if (kind == "principled") return principled_reflectance(principled_from(dict));
-  throw InputError("preview: expected 'live' or 'principled', found '" + kind + "'.");
+  if (kind == "closures") return closures_reflectance(closures_from(dict));
+  throw InputError("preview: expected 'live', 'principled' or 'closures', found '" + kind + "'.");
 }
 
 py::array_t<float> preview(const py::object& source, int size) {
@@ -283,6 +357,41 @@ std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string
   return std::make_unique<PythonJob>(source.cast<std::filesystem::path>(), options);
 }
 
+// The closures of a Measurement or of a dict of parameters: `count` specular ones, or with a
+// negative count as few as stay within the tolerance.
+std::unique_ptr<ClosureJob> start_closure_job(const py::object& source, int count,
+                                              double tolerance, bool cap_albedo, int threads) {
+  if (count > most_specular_closures) {
+    throw InputError("closures: expected at most " + std::to_string(most_specular_closures) +
+                     ", found " + std::to_string(count) + ".");
+  }
+  if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
+  const Reflectance target = py::isinstance<Measurement>(source)
+                                 ? measured_reflectance(source.cast<SharedMeasurement>())
+                                 : model_reflectance(parameters_from(source.cast<py::dict>()));
+  const ClosureFitOptions options{std::max(count, 0), cap_albedo, threads};
+  return std::make_unique<ClosureJob>([=](Monitor& monitor) {
+    const Target sampled = sample_target(target);
+    return count >= 0 ? fit_closures(sampled, options, monitor)
+                      : fit_closures_within(sampled, tolerance, options, monitor);
+  });
+}
+
+template <typename Owner>
+void bind_job_methods(py::class_<Owner>& bound, auto job_of) {
+  bound.def_property_readonly("progress", [=](Owner& o) { return job_of(o).progress(); })
+      .def_property_readonly("stage", [=](Owner& o) { return job_of(o).stage(); })
+      .def_property_readonly("done", [=](Owner& o) { return job_of(o).done(); })
+      .def("cancel", [=](Owner& o) { job_of(o).cancel(); })
+      .def(
+          "wait",
+          [=](Owner& o, double seconds) {
+            const py::gil_scoped_release release;
+            return job_of(o).wait(std::chrono::duration<double>(seconds));
+          },
+          py::arg("seconds"), "Waits up to that long; True when the job is done.");
+}
+
 void bind_measurement(py::module_& module) {
   py::class_<Measurement, SharedMeasurement>(
       module, "Measurement", "A measured isotropic reflectance on the MERL grid, in 1/sr.")
@@ -319,26 +428,32 @@ void bind_measurement(py::module_& module) {
           py::arg("path"), "Writes a MERL .binary file.");
 }
 
-void bind_job(py::module_& module) {
-  py::class_<PythonJob>(module, "FitJob", "A fit that runs in a thread of its own.")
-      .def(py::init(&start_job), py::arg("source"), py::arg("model") = "interpolated",
-           py::arg("fresnel") = true, py::arg("schedule") = "polish", py::arg("norm") = "l1",
-           py::arg("max_angle") = 90.0, py::arg("channels") = "shared", py::arg("threads") = 0,
-           "Starts at once; source is a path or a Measurement.")
-      .def_property_readonly("progress", [](const PythonJob& p) { return p.job.progress(); })
-      .def_property_readonly("stage", [](const PythonJob& p) { return p.job.stage(); })
-      .def_property_readonly("done", [](const PythonJob& p) { return p.job.done(); })
-      .def("cancel", [](PythonJob& p) { p.job.cancel(); })
-      .def(
-          "wait",
-          [](const PythonJob& p, double seconds) {
-            const py::gil_scoped_release release;
-            return p.job.wait(std::chrono::duration<double>(seconds));
-          },
-          py::arg("seconds"), "Waits up to that long; True when the job is done.")
-      .def(
-          "result", [](const PythonJob& p) { return to_dict(p.job.result(), p.options); },
-          "The fit as a dict; raises what ended the job.");
+void bind_jobs(py::module_& module) {
+  py::class_<PythonJob> fit(module, "FitJob", "A fit that runs in a thread of its own.");
+  fit.def(py::init(&start_job), py::arg("source"), py::arg("model") = "interpolated",
+          py::arg("fresnel") = true, py::arg("schedule") = "polish", py::arg("norm") = "l1",
+          py::arg("max_angle") = 90.0, py::arg("channels") = "shared", py::arg("threads") = 0,
+          "Starts at once; source is a path or a Measurement.");
+  bind_job_methods(fit, [](PythonJob& p) -> RecordJob& { return p.job; });
+  fit.def(
+      "result", [](const PythonJob& p) { return to_dict(p.job.result(), p.options); },
+      "The fit as a dict; raises what ended the job.");
+  fit.def_property_readonly(
+      "measurement",
+      [](const PythonJob& p) {
+        return std::const_pointer_cast<Measurement>(p.job.result().measurement);
+      },
+      "What was read and fitted, of a job that is done.");
+  py::class_<ClosureJob> closures(module, "ClosureJob",
+                                  "A search for closures that runs in a thread of its own.");
+  closures.def(py::init(&start_closure_job), py::arg("source"), py::arg("count") = 2,
+               py::arg("tolerance") = 0.0, py::arg("cap_albedo") = false, py::arg("threads") = 0,
+               "Starts at once; source is a Measurement or a dict of parameters. A negative count "
+               "stands for as few closures as stay within the tolerance.");
+  bind_job_methods(closures, [](ClosureJob& job) -> ClosureJob& { return job; });
+  closures.def(
+      "result", [](const ClosureJob& job) { return to_dict(job.result()); },
+      "The closures as a dict; raises what ended the job.");
 }
 
 void bind_errors(py::module_& module) {
@@ -378,9 +493,17 @@ void bind_functions(py::module_& module) {
       py::arg("principled"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of a Principled BSDF as Cycles renders it, (N, 3).");
   module.def(
+      "evaluate_closures",
+      [](const py::dict& closures, const DirectionArray& wi, const DirectionArray& wo) {
+        return evaluate_rows(closures_reflectance(closures_from(closures)), wi, wo);
+      },
+      py::arg("closures"), py::arg("wi"), py::arg("wo"),
+      "f cos(theta_i) of an entry of a record's closures as Cycles renders it, (N, 3).");
+  module.def(
       "preview", &preview, py::arg("source"), py::arg("size"),
       "The sphere under two lights, (size, size, 3) linear, row 0 at the top. source: a "
-      "Measurement, a dict of parameters, ('live', parameters) or ('principled', its dict).");
+      "Measurement, a dict of parameters, ('live', parameters), ('principled', its dict) or "
+      "('closures', an entry of a record's closures).");
 }
 
 }  // namespace
@@ -392,6 +515,6 @@ PYBIND11_MODULE(_native, module) {
   module.attr("build_id") = LOBEFIT_BUILD_ID;
   lobefit::bind_errors(module);
   lobefit::bind_measurement(module);
-  lobefit::bind_job(module);
+  lobefit::bind_jobs(module);
   lobefit::bind_functions(module);
 }

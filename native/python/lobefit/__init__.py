@@ -10,16 +10,18 @@ Nothing here needs Blender; materials are built from a record by the package `lo
 
 from lobefit._native import Cancelled, InputError, Measurement
 from lobefit._native import version as __version__
-from lobefit.fitting import Job, fit, read, start_fit
+from lobefit.fitting import Closures, Job, closures, fit, read, start_fit
 from lobefit.record import Record
 
 __all__ = [
     "Cancelled",
+    "Closures",
     "InputError",
     "Job",
     "Measurement",
     "Record",
     "__version__",
+    "closures",
     "fit",
     "read",
     "start_fit",

@@ -1,15 +1,22 @@
-"""Fits in the background: a job to ask for its progress, and a call that waits for one."""
+"""Fits in the background: a job to ask for its progress, and calls that wait for one."""
 
+import dataclasses
 import os
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from lobefit import _native
-from lobefit._native import Cancelled, Measurement
+from lobefit._native import Cancelled, InputError, Measurement
 from lobefit.origin import Origin, origin_of
 from lobefit.record import MODELS, Fit, Record, figure_of, without_nan
 
 Source = str | os.PathLike[str] | Measurement
+
+TARGETS = ("measured", "lobe")
+MOST_CLOSURES = 3
 
 _POLL = 0.05  # seconds between two looks at a job that is waited for
 _FIT_KEYS = tuple(Fit.__dataclass_fields__)
@@ -24,29 +31,70 @@ def read(path: str | os.PathLike[str]) -> Measurement:
     return Measurement.read(os.fspath(path))
 
 
+@dataclass(frozen=True)
+class Closures:
+    """A request for an approximation by a diffuse closure and `count` specular ones (0 to 3).
+
+    `target` is "measured", the measurement itself, or "lobe", the fitted model. With a `tolerance`
+    (a part of the light of a picture of a sphere) as few closures are taken as keep to it, and
+    `count` counts for nothing. `cap_albedo` keeps the albedo at 1 or less where the target, as
+    measurements do, exceeds it; it never exceeds the target's by more than 2 %.
+    """
+
+    target: str = "measured"
+    count: int = 2
+    tolerance: float | None = None
+    cap_albedo: bool = False
+
+    def __post_init__(self) -> None:
+        if self.target not in TARGETS:
+            raise InputError(f"target: expected measured or lobe, found {self.target!r}.")
+        if not 0 <= self.count <= MOST_CLOSURES:
+            raise InputError(f"closures: expected 0 to {MOST_CLOSURES}, found {self.count}.")
+
+
 class Job:
     """A fit under way in threads of its own; it starts at once and never holds Python up.
 
-    `model` is one of `record.MODELS`, or "all" for one after the other. `fresnel` False fits the
-    models without the Fresnel term. `schedule` is "stages" (the three of Nielsen et al.) or
-    "polish" (a joint fit after them). `norm` is "l1" (the paper's), "cosine-l1", "l2" or "log-l2".
-    `max_angle` in degrees (up to 90) leaves out light and view directions beyond it. `channels` is
-    "shared" (one exponent) or "separate". `threads` 0 takes every processor.
+    `source` is a file, a measurement, or a record, whose fit is then kept. `model` is one of
+    `record.MODELS`, or "all" for one after the other. `closures` are approximations to find after
+    the fit. `fresnel` False fits the models without the Fresnel term. `schedule` is "stages" (the
+    three of Nielsen et al.) or "polish" (a joint fit after them). `norm` is "l1" (the paper's),
+    "cosine-l1", "l2" or "log-l2". `max_angle` in degrees (up to 90) leaves out light and view
+    directions beyond it. `channels` is "shared" (one exponent) or "separate". `threads` 0 takes
+    every processor.
     """
 
-    def __init__(self, source: Source, model: str = "interpolated", **options: Any) -> None:
-        self._source = source if isinstance(source, Measurement) else os.fspath(source)
+    def __init__(
+        self,
+        source: Source | Record,
+        model: str = "interpolated",
+        closures: Sequence[Closures] = (),
+        **options: Any,
+    ) -> None:
         self._options = options
-        self._models = list(MODELS) if model == "all" else [model]
-        self._results: list[dict[str, Any]] = []
+        self._closures = list(closures)
+        self._fitted: list[dict[str, Any]] = []
+        self._found: list[dict[str, Any]] = []
+        self._record: Record | None = None
+        self._measurement: Measurement | None = None
+        self._source: Source = ""
+        self._models: list[str] = []
+        if isinstance(source, Record):
+            self._record = source
+        else:
+            self._source = source if isinstance(source, Measurement) else os.fspath(source)
+            self._models = list(MODELS) if model == "all" else [model]
         self._cancelled = False
-        self._running: _native.FitJob | None = self._start()
+        self._running: _native.FitJob | _native.ClosureJob | None = None
+        self._begin_next()
 
     @property
     def progress(self) -> float:
         """The share that is done, from 0 to 1."""
         now = 0.0 if self._running is None else self._running.progress
-        return (len(self._results) + now) / len(self._models)
+        done = len(self._fitted) + len(self._found)
+        return (done + now) / max(1, len(self._models) + len(self._closures))
 
     @property
     def stage(self) -> str:
@@ -70,11 +118,11 @@ class Job:
             return True
         if not self._running.wait(seconds):
             return False
-        if self._cancelled or len(self._results) + 1 == len(self._models):
+        if self._cancelled or self._failed():
             return True
-        self._results.append(self._running.result())
-        self._running = self._start()
-        return False
+        self._end_current()
+        self._begin_next()
+        return self._running is None
 
     def record(self) -> Record:
         """Waits for the end and tells what was found.
@@ -86,18 +134,71 @@ class Job:
         if self._cancelled:
             raise Cancelled("the fit was cancelled")
         if self._running is not None:
-            self._results.append(self._running.result())
-            self._running = None
-        return _record(self._results, self._origin())
+            self._running.result()  # raises what ended it
+        record = self._base_record()
+        fresh = {(entry["target"], entry["count"]) for entry in self._found}
+        kept = [e for e in record.closures if (e["target"], e["count"]) not in fresh]
+        found = sorted(kept + self._found, key=lambda e: (e["target"], e["count"]))
+        return dataclasses.replace(record, closures=found)
 
-    def _start(self) -> _native.FitJob:
-        return _native.FitJob(self._source, model=self._models[len(self._results)], **self._options)
+    def _base_record(self) -> Record:
+        if self._record is None:
+            self._record = _record(self._fitted, self._origin())
+        return self._record
+
+    def _begin_next(self) -> None:
+        self._running = None
+        if len(self._fitted) < len(self._models):
+            model = self._models[len(self._fitted)]
+            self._running = _native.FitJob(self._source, model=model, **self._options)
+        elif len(self._found) < len(self._closures):
+            request = self._closures[len(self._found)]
+            self._began = time.perf_counter()
+            self._running = _native.ClosureJob(
+                self._target(request),
+                count=request.count if request.tolerance is None else -1,
+                tolerance=request.tolerance or 0.0,
+                cap_albedo=request.cap_albedo,
+                threads=self._options.get("threads", 0),
+            )
+
+    def _failed(self) -> bool:
+        try:
+            self._running.result()
+        except Exception:
+            return True
+        return False
+
+    def _end_current(self) -> None:
+        result = without_nan(self._running.result())
+        if isinstance(self._running, _native.FitJob):
+            self._fitted.append(result)
+            self._measurement = self._running.measurement
+            return
+        request = self._closures[len(self._found)]
+        count = request.count if request.tolerance is None else len(result["specular"])
+        asked = {"target": request.target, "count": count, "cap_albedo": request.cap_albedo}
+        seconds = time.perf_counter() - self._began
+        self._found.append(asked | result | {"seconds": seconds})
+
+    def _target(self, request: Closures) -> Measurement | dict[str, Any]:
+        if request.target == "lobe":
+            return self._base_record().parameters
+        if self._measurement is None:
+            path = self._base_record().source["path"]
+            if path is None or not Path(path).is_file():
+                raise InputError(
+                    f"{path or self._base_record().name}: expected the measurement of the record, "
+                    "found no such file."
+                )
+            self._measurement = read(path)
+        return self._measurement
 
     def _origin(self) -> Origin:
         return origin_of(self._source) if isinstance(self._source, str) else Origin()
 
 
-def start_fit(source: Source, **options: Any) -> Job:
+def start_fit(source: Source | Record, **options: Any) -> Job:
     """Starts the fit of a file or a measurement; options are those of `Job`."""
     return Job(source, **options)
 
@@ -110,7 +211,30 @@ def fit(
     `progress` is called with the share done (0 to 1) and the stage some twenty times a second. An
     exception out of it, or Ctrl-C, ends the fit.
     """
-    job = start_fit(source, **options)
+    return _wait_for(start_fit(source, **options), progress)
+
+
+def closures(
+    source: Source | Record,
+    *,
+    target: str = "measured",
+    count: int = 2,
+    tolerance: float | None = None,
+    cap_albedo: bool = False,
+    progress: Callable[[float, str], None] | None = None,
+    **options: Any,
+) -> Record:
+    """The record of a file, a measurement or a record with an approximation by closures added.
+
+    `target`, `count`, `tolerance` and `cap_albedo` are those of `Closures`; `options` are those of
+    `Job`, for the fit of what is not a record yet. Raises InputError where the measurement of a
+    record is no longer there.
+    """
+    request = Closures(target, count, tolerance, cap_albedo)
+    return _wait_for(Job(source, closures=[request], **options), progress)
+
+
+def _wait_for(job: Job, progress: Callable[[float, str], None] | None) -> Record:
     try:
         while not job.wait(_POLL):
             if progress:

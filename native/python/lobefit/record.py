@@ -58,6 +58,14 @@ class Record(Fit):
     `source` is {path, sha256, format, bins} with the `name` of a sample where the file is one; path
     and sha256 are None for a measurement that was never a file. `models` holds a fit for each model
     when several were fitted; the record's own model is then the one with the least error.
+
+    `closures` are approximations of the measurement or the fitted lobe by a few Cycles closures,
+    each {target, count, cap_albedo, error, seconds, by_view, diffuse, specular}: `target` is
+    "measured" or "lobe", `count` the number of specular closures asked for, `error` the mean L1
+    difference of pictures of a sphere over all angles between light and viewer,
+    `by_view` {view_angle, target_albedo, closures_albedo, relative_error}, `diffuse` three weight
+    curves (red, green, blue) and `specular` {distribution, roughness, anisotropy, bend,
+    weight [3]}. A curve is a list of points [cosine of the view angle, value], linear between.
     """
 
     source: dict[str, Any]
@@ -67,6 +75,7 @@ class Record(Fit):
     max_angle: float
     machine: dict[str, Any] = field(default_factory=lambda: this_machine())
     models: dict[str, Fit] = field(default_factory=dict)
+    closures: list[dict[str, Any]] = field(default_factory=list)
     schema: int = SCHEMA
 
     @property
@@ -331,6 +340,36 @@ _FIT: dict[str, _Check] = {
     "warnings": _list(_TEXT),
     "principled": _PRINCIPLED,
 }
+_CURVE = _list(_list(_NUMBER, 2))
+_CLOSURES = _object(
+    {
+        "target": _choice("measured", "lobe"),
+        "count": _COUNT,
+        "cap_albedo": _FLAG,
+        "error": _AMOUNT,
+        "seconds": _AMOUNT,
+        "by_view": _object(
+            {
+                "view_angle": _list(_NUMBER),
+                "target_albedo": _COLORS,
+                "closures_albedo": _COLORS,
+                "relative_error": _list(_AMOUNT),
+            }
+        ),
+        "diffuse": _list(_CURVE, 3),
+        "specular": _list(
+            _object(
+                {
+                    "distribution": _choice("ggx", "beckmann"),
+                    "roughness": _CURVE,
+                    "anisotropy": _CURVE,
+                    "bend": _CURVE,
+                    "weight": _list(_CURVE, 3),
+                }
+            )
+        ),
+    }
+)
 _BINS = _object({key: _COUNT for key in ("valid", "below_horizon", "negative", "non_finite")})
 _RECORD = _fit(
     {
@@ -346,5 +385,6 @@ _RECORD = _fit(
     {
         "machine": _object({"system": _TEXT, "processor": _TEXT, "threads": _COUNT}),
         "models": _models,
+        "closures": _list(_CLOSURES),
     },
 )
