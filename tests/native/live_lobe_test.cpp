@@ -108,7 +108,7 @@ TEST(LiveLobe, HasThePeakOfPhongsLobe) {
         const double here = std::pow(std::cos(a), exponent) * std::cos(theta + a);
         if (here > value) best = a, value = here;
       }
-      const LiveClosure closure = live_closure(std::cos(theta), exponent, 0, 1, 0);
+      const LiveClosure closure = live_closures(std::cos(theta), exponent, 0, 1, 0).bent;
       // The fitted factors move the tilt by up to 6 % of itself where the lobe is wide.
       EXPECT_NEAR(std::atan(closure.tilt), -best / 2, 0.06 * -best / 2 + 1e-5);
       const Parameters lobe = interpolated(exponent, 0);
@@ -141,22 +141,27 @@ TEST(LiveLobe, HasThePeakOfTheFormulaWhenNarrow) {
 TEST(LiveLobe, IsIsotropicAtNormalIncidence) {
   for (const double exponent : {0.0, 3.0, 200.0}) {
     for (const double ior : {1.01, 1.5, 3.0}) {
-      const LiveClosure closure = live_closure(1, exponent, 0.6, ior, 1);
-      EXPECT_EQ(closure.tilt, 0);
-      // Two ways to the same number, so rounding alone differs.
-      EXPECT_NEAR(closure.alpha_x, closure.alpha_y, 1e-12);
+      const LiveClosures closures = live_closures(1, exponent, 0.6, ior, 1);
+      for (const LiveClosure& closure : {closures.bent, closures.broad}) {
+        EXPECT_EQ(closure.tilt, 0);
+        // Two ways to the same number, so rounding alone differs.
+        EXPECT_NEAR(closure.alpha_x, closure.alpha_y, 1e-12);
+      }
     }
   }
 }
 
 TEST(LiveLobe, BlendsFresnelWithOne) {
-  const LiveClosure without = live_closure(0.4, 30, 0.5, 1.5, 0),
-                    ignored = live_closure(0.4, 30, 0.5, 2.5, 0);
-  EXPECT_EQ(without.weight, ignored.weight);
-  const double full = live_closure(1, 30, 0.5, 1.5, 1).weight;
-  const double none = live_closure(1, 30, 0.5, 1.5, 0).weight;
-  // At normal incidence R_F of 1.5 is 0.04; its curvature there is too small to widen the lobe.
-  EXPECT_NEAR(full / none, fresnel_reflectance(1, 1.5).value, 1e-4);
+  const LiveClosures without = live_closures(0.4, 30, 0.5, 1.5, 0),
+                     ignored = live_closures(0.4, 30, 0.5, 2.5, 0);
+  EXPECT_EQ(without.bent.weight, ignored.bent.weight);
+  EXPECT_EQ(without.broad.weight, ignored.broad.weight);
+  const LiveClosures full = live_closures(1, 30, 0.5, 1.5, 1);
+  const LiveClosures none = live_closures(1, 30, 0.5, 1.5, 0);
+  // At normal incidence R_F has no slope, so it is a factor but for rounding.
+  const double facing = fresnel_reflectance(1, 1.5).value;
+  EXPECT_NEAR(full.bent.weight / none.bent.weight, facing, 1e-12);
+  EXPECT_NEAR(full.broad.weight / none.broad.weight, facing, 1e-12);
 }
 
 TEST(LiveLobe, StaysNearTheFormula) {
