@@ -27,16 +27,17 @@ EXPONENT_LIMIT = 1e5
 # tangent along the normal. Its direction is one that no modelled surface faces.
 TINY_TANGENT = (3.7e-7, 5.9e-7, 7.1e-7)
 # The same numbers, fitted to the formula of the lobe, as `Correction` in live_lobe.cpp.
-TILT_Z, TILT_ZU, TILT_RISE = 2.16, -1.94, -5.28
-BOTH, BOTH_WIDE, BOTH_ALPHA = 0.486, 0.71, -0.341
-X_Z, X_ZPHI, X_ZWIDE, X_PHI = 6.96, -6.9, -8.58, -0.854
-Y_Z, Y_ZZ = 2.13, 12.6
-WEIGHT_ZZ, WEIGHT_WIDE, WEIGHT_RISE, WEIGHT_ALPHA = -30.0, -0.441, -1.24, -0.106
-BROAD_WIDE = 1.69
-BROAD_X_Z, BROAD_X_ZZ, BROAD_X_ZPHI, BROAD_X_RISE = -3.32, 8.48, 4.13, 1.21
-BROAD_Y_ALPHA, BROAD_Y_PHI = 1.73, -1.09
-SHARE, SHARE_WIDE, SHARE_RISE = -1.89, 0.976, -1.41
-SHARE_Z, SHARE_ZZ, SHARE_ZPHI = 6.67, -12.4, -2.48
+TILT_Z, TILT_ZU, TILT_UU, TILT_RISE = 2.53, -2.21, -0.398, -5.28
+BOTH, BOTH_WIDE, BOTH_ALPHA = 0.482, 0.741, -0.342
+X_Z, X_ZWIDE, X_PHI, X_PHI2 = 6.34, -9.81, -1.21, 0.888
+Y_Z, Y_ZZ = 2.56, 10.6
+WEIGHT_ZZ, WEIGHT_WIDE, WEIGHT_ALPHA = -27.2, -0.426, -0.115
+WEIGHT_PHI2, WEIGHT_RISE = 0.223, -1.49
+BROAD_WIDE = 1.11
+BROAD_X_Z, BROAD_X_ZZ, BROAD_X_RISE = -2.12, 6.95, 1.9
+BROAD_Y_ALPHA, BROAD_Y_PHI2 = 1.79, -0.975
+SHARE, SHARE_WIDE, SHARE_RISE = -1.95, 0.958, -1.28
+SHARE_Z, SHARE_ZZ, SHARE_ZPHI = 6.78, -15.0, -2.18
 SHARE_END = 0.004
 LEAST_PULL = 0.05
 
@@ -288,19 +289,21 @@ def _lobe(inputs: _Inputs, view: _View, fresnel: _Fresnel) -> _Lobe:
 
 def _bent(inputs: _Inputs, view: _View, lobe: _Lobe, fresnel: _Fresnel) -> _Closure:
     s, alpha, phi, z, wide = inputs.exponent, inputs.interpolation, fresnel.phi, lobe.z, lobe.wide
-    log_tilt = z * (view.sine2 * TILT_ZU + TILT_Z) + lobe.wide_rise * TILT_RISE
+    wide_uu = wide * (view.sine2 * view.sine2)
+    log_tilt = wide_uu * TILT_UU + lobe.wide_rise * TILT_RISE
+    log_tilt = z * (view.sine2 * TILT_ZU + TILT_Z) + log_tilt
     tilt = (lobe.tan_tau * log_tilt.exp()).named("tan tilt")
     shrink = (tilt * tilt + 1).inverse_sqrt()
     c = ((view.sine * tilt + view.cosine) * shrink).named("c")
     c2 = c * c
     across = s * ((1 - alpha) * c2 + alpha) + (phi * (0.5 - c2) + c2)
     both = wide * (wide * BOTH_WIDE + (alpha * BOTH_ALPHA + BOTH))
-    wide_z = wide * z
-    log_x = wide_z * (phi * X_ZPHI + (wide * X_ZWIDE + X_Z)) + (wide * phi * X_PHI + both)
-    log_y = wide_z * (z * Y_ZZ + Y_Z) + both
-    own = wide * WEIGHT_WIDE + (alpha * WEIGHT_ALPHA + z * z * WEIGHT_ZZ)
-    log_wide = wide * own + lobe.wide_rise * WEIGHT_RISE
-    log_peak = s * lobe.log_base + (phi * view.tan * (tilt * shrink) * -2 + log_wide)
+    phi2 = phi * phi
+    log_x = wide * (z * (wide * X_ZWIDE + X_Z) + phi * (wide * phi * X_PHI2 + X_PHI)) + both
+    log_y = wide * z * (z * Y_ZZ + Y_Z) + both
+    log_weight = wide * WEIGHT_WIDE + (alpha * WEIGHT_ALPHA + z * z * WEIGHT_ZZ)
+    log_weight = phi2 * WEIGHT_PHI2 + (fresnel.rise * WEIGHT_RISE + log_weight)
+    log_peak = s * lobe.log_base + phi * view.tan * (tilt * shrink) * -2 + wide * log_weight
     return _Closure(
         inverse_x2=(lobe.curvature * log_x.exp() * 2 + 1).named("1 / alpha_x^2"),
         inverse_y2=(across * log_y.exp() * 2 + 1).named("1 / alpha_y^2"),
@@ -312,9 +315,8 @@ def _bent(inputs: _Inputs, view: _View, lobe: _Lobe, fresnel: _Fresnel) -> _Clos
 def _broad(inputs: _Inputs, view: _View, lobe: _Lobe, fresnel: _Fresnel) -> _Closure:
     s, alpha, phi, z, wide = inputs.exponent, inputs.interpolation, fresnel.phi, lobe.z, lobe.wide
     both = wide * wide * BROAD_WIDE
-    log_x = z * (z * BROAD_X_ZZ + (phi * BROAD_X_ZPHI + BROAD_X_Z))
-    log_x = lobe.wide_rise * BROAD_X_RISE + (log_x + both)
-    log_y = phi * phi * BROAD_Y_PHI + (alpha * z * BROAD_Y_ALPHA + both)
+    log_x = z * (z * BROAD_X_ZZ + BROAD_X_Z) + (lobe.wide_rise * BROAD_X_RISE + both)
+    log_y = phi * phi * BROAD_Y_PHI2 + (alpha * z * BROAD_Y_ALPHA + both)
     across = s * ((alpha - 1) * view.sine2 + 1)
     log_share = z * (wide * z * SHARE_ZZ + (phi * SHARE_ZPHI + SHARE_Z))
     log_share = lobe.wide_rise * SHARE_RISE + (wide * SHARE_WIDE + SHARE) + log_share

@@ -11,18 +11,17 @@ namespace {
 // The fitted numbers of the corrections, by what is corrected and what they are multiplied by; the
 // same stand in addon/nodes/live.py.
 struct Correction {
-  static constexpr double tilt_z = 2.16, tilt_zu = -1.94, tilt_rise = -5.28;
-  static constexpr double both = 0.486, both_wide = 0.71, both_alpha = -0.341;
-  static constexpr double x_z = 6.96, x_zphi = -6.9, x_zwide = -8.58, x_phi = -0.854;
-  static constexpr double y_z = 2.13, y_zz = 12.6;
-  static constexpr double weight_zz = -30, weight_wide = -0.441, weight_rise = -1.24,
-                          weight_alpha = -0.106;
-  static constexpr double broad_wide = 1.69;
-  static constexpr double broad_x_z = -3.32, broad_x_zz = 8.48, broad_x_zphi = 4.13,
-                          broad_x_rise = 1.21;
-  static constexpr double broad_y_alpha = 1.73, broad_y_phi = -1.09;
-  static constexpr double share = -1.89, share_wide = 0.976, share_rise = -1.41;
-  static constexpr double share_z = 6.67, share_zz = -12.4, share_zphi = -2.48;
+  static constexpr double tilt_z = 2.53, tilt_zu = -2.21, tilt_uu = -0.398, tilt_rise = -5.28;
+  static constexpr double both = 0.482, both_wide = 0.741, both_alpha = -0.342;
+  static constexpr double x_z = 6.34, x_zwide = -9.81, x_phi = -1.21, x_phi2 = 0.888;
+  static constexpr double y_z = 2.56, y_zz = 10.6;
+  static constexpr double weight_zz = -27.2, weight_wide = -0.426, weight_alpha = -0.115,
+                          weight_phi2 = 0.223, weight_rise = -1.49;
+  static constexpr double broad_wide = 1.11;
+  static constexpr double broad_x_z = -2.12, broad_x_zz = 6.95, broad_x_rise = 1.9;
+  static constexpr double broad_y_alpha = 1.79, broad_y_phi2 = -0.975;
+  static constexpr double share = -1.95, share_wide = 0.958, share_rise = -1.28;
+  static constexpr double share_z = 6.78, share_zz = -15, share_zphi = -2.18;
   static constexpr double share_end = 0.004;
 };
 
@@ -77,32 +76,32 @@ LiveClosures live_closures(double cos_view, double exponent, double interpolatio
   const double curvature = s * (1 + x2 * (1 - 0.75 * alpha)) + (1 + pull) / 2 * sec2_i;
 
   const double z = pull * tan2_i / curvature, wide = 1 / (s + 1);
-  const double wide_rise = wide * f.rise;
+  const double phi2 = square(f.phi), wide_rise = wide * f.rise;
 
   // The bent closure.
-  const double tilt =
-      y * std::exp(z * (C::tilt_z + C::tilt_zu * sin2_o) + C::tilt_rise * wide_rise);
+  const double tilt = y * std::exp(z * (C::tilt_z + C::tilt_zu * sin2_o) +
+                                   C::tilt_uu * wide * square(sin2_o) + C::tilt_rise * wide_rise);
   const double shrink = 1 / std::sqrt(1 + square(tilt));
   const double c = (cos_o + sin_o * tilt) * shrink, c2 = square(c);
   const double across = s * (alpha + (1 - alpha) * c2) + c2 - f.phi * (c2 - 0.5);
   const double both = wide * (C::both + C::both_wide * wide + C::both_alpha * alpha);
   const double log_x =
-      both + wide * (z * (C::x_z + C::x_zphi * f.phi + C::x_zwide * wide) + C::x_phi * f.phi);
+      both + wide * (z * (C::x_z + C::x_zwide * wide) + C::x_phi * f.phi + C::x_phi2 * wide * phi2);
   const double log_y = both + wide * z * (C::y_z + C::y_zz * z);
   const double inverse_x2 = 1 + 2 * curvature * std::exp(log_x);
   const double inverse_y2 = 1 + 2 * across * std::exp(log_y);
-  const double log_peak = s * log_base - 2 * f.phi * tan_o * tilt * shrink +
-                          wide * (C::weight_zz * z * z + C::weight_wide * wide +
-                                  C::weight_alpha * alpha + C::weight_rise * f.rise);
+  const double log_peak =
+      s * log_base - 2 * f.phi * tan_o * tilt * shrink +
+      wide * (C::weight_zz * z * z + C::weight_wide * wide + C::weight_alpha * alpha +
+              C::weight_phi2 * phi2 + C::weight_rise * f.rise);
   const double weight =
       4 * pi * f.value * c * std::exp(log_peak) / std::sqrt(inverse_x2 * inverse_y2 * sec2_i);
 
   // The broad one.
   const double broad = C::broad_wide * wide * wide;
-  const double broad_log_x = broad +
-                             z * (C::broad_x_z + C::broad_x_zz * z + C::broad_x_zphi * f.phi) +
-                             C::broad_x_rise * wide_rise;
-  const double broad_log_y = broad + C::broad_y_alpha * alpha * z + C::broad_y_phi * f.phi * f.phi;
+  const double broad_log_x =
+      broad + z * (C::broad_x_z + C::broad_x_zz * z) + C::broad_x_rise * wide_rise;
+  const double broad_log_y = broad + C::broad_y_alpha * alpha * z + C::broad_y_phi2 * phi2;
   const double broad_x2 = 1 + s * std::exp(broad_log_x);
   const double broad_y2 = 1 + s * (alpha + (1 - alpha) * square(cos_o)) * std::exp(broad_log_y);
   const double log_share = C::share + C::share_wide * wide + C::share_rise * wide_rise +
