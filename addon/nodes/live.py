@@ -1,8 +1,9 @@
 """The node group 'Lobefit Live': the interpolated lobe in closed form, every parameter a socket.
 
-One Beckmann closure with a bent normal plus a diffuse closure. The formulas are derived in
-native/closures/live_lobe.h, and native/closures/live_lobe.cpp computes the same in C++ with the
-same names, so that previews need no rendering.
+A Beckmann closure with a bent normal, a broad one that fills in where the lobe is wide, and a
+diffuse one. The formulas are derived in native/closures/live_lobe.h, and
+native/closures/live_lobe.cpp computes the same in C++ with the same names, so that previews need no
+rendering.
 """
 
 import math
@@ -17,7 +18,7 @@ from .tree import NodeFormulas, Scalar, Vector
 NAME = "Lobefit Live"
 # Saved with the group: a file's group is used again only if it is the same group. To be raised
 # with any change of the formulas.
-VERSION = 1
+VERSION = 2
 VERSION_KEY = "lobefit_version"
 
 # Sharper lobes are drawn as this one, with the same albedo: single precision loses their peak.
@@ -25,13 +26,20 @@ EXPONENT_LIMIT = 1e5
 # Added to the tangent: at normal incidence nothing else is left of it, and Cycles makes NaN of a
 # tangent along the normal. Its direction is one that no modelled surface faces.
 TINY_TANGENT = (3.7e-7, 5.9e-7, 7.1e-7)
-# The same factors, fitted to the formula of the lobe, as `Correction` in live_lobe.cpp.
-LEAST_CURVATURE = 0.87
-TILT_Z, TILT_ZZ = 0.59, -1.71
-OFFSET_ALPHA = -0.77
-X_ZZ, X_Q = -1.16, 1.0
-Y_Z, Y_Q = 0.04, 12.5
-WEIGHT_ZZ, WEIGHT_ALPHA, WEIGHT_Q = -0.31, -0.14, 0.61
+# The same numbers, fitted to the formula of the lobe, as `Correction` in live_lobe.cpp.
+TILT_Z, TILT_ZU, TILT_UU, TILT_RISE = 2.53, -2.21, -0.398, -5.28
+BOTH, BOTH_WIDE, BOTH_ALPHA = 0.482, 0.741, -0.342
+X_Z, X_ZWIDE, X_PHI, X_PHI2 = 6.34, -9.81, -1.21, 0.888
+Y_Z, Y_ZZ = 2.56, 10.6
+WEIGHT_ZZ, WEIGHT_WIDE, WEIGHT_ALPHA = -27.2, -0.426, -0.115
+WEIGHT_PHI2, WEIGHT_RISE = 0.223, -1.49
+BROAD_WIDE = 1.11
+BROAD_X_Z, BROAD_X_ZZ, BROAD_X_RISE = -2.12, 6.95, 1.9
+BROAD_Y_ALPHA, BROAD_Y_PHI2 = 1.79, -0.975
+SHARE, SHARE_WIDE, SHARE_RISE = -1.95, 0.958, -1.28
+SHARE_Z, SHARE_ZZ, SHARE_ZPHI = 6.78, -15.0, -2.18
+SHARE_END = 0.004
+LEAST_PULL = 0.05
 
 
 def normal_albedo(exponent: Any, interpolation: Any) -> Any:
@@ -137,35 +145,39 @@ class _View:
     tangent: Vector
     cosine: Scalar
     sine: Scalar
+    sine2: Scalar
+    tan: Scalar
+    tan2: Scalar
+
+
+@dataclass
+class _Fresnel:
+    value: Scalar
+    phi: Scalar
+    rise: Scalar
 
 
 @dataclass
 class _Lobe:
     """The lobe at the peak of its Phong relative, for k_s = 1: see live_lobe.h, step 1."""
 
-    y: Scalar
-    p: Scalar
-    m: Scalar
+    tan_tau: Scalar
     log_base: Scalar
-    tan2_i: Scalar
-    slope: Scalar
+    sec2_i: Scalar
     curvature: Scalar
     z: Scalar
-
-
-@dataclass
-class _Fresnel:
-    value: Scalar
-    slope: Scalar
-    curvature: Scalar
+    wide: Scalar
+    wide_rise: Scalar
 
 
 @dataclass
 class _Closure:
-    tilt: Scalar
+    """A Beckmann closure; its weight is 4 pi k_s F amount / sqrt(inverse_x2 inverse_y2)."""
+
     inverse_x2: Scalar
     inverse_y2: Scalar
-    weight: Scalar
+    amount: Scalar
+    normal: Vector
 
 
 def _add_nodes(formulas: NodeFormulas) -> None:
@@ -173,15 +185,16 @@ def _add_nodes(formulas: NodeFormulas) -> None:
         inputs = _inputs(formulas)
     with formulas.frame("View"):
         view = _view(formulas, inputs)
-    with formulas.frame("Lobe at its peak"):
-        lobe = _lobe(inputs, view)
     with formulas.frame("Fresnel"):
-        tan_peak = (view.sine - view.cosine * lobe.y) / (view.cosine + view.sine * lobe.y)
-        fresnel = _fresnel(inputs, tan_peak.named("tan theta'"))
-    with formulas.frame("Matching Beckmann lobe"):
-        closure = _closure(inputs, view, lobe, fresnel, tan_peak)
+        fresnel = _fresnel(inputs, view)
+    with formulas.frame("Lobe at its peak"):
+        lobe = _lobe(inputs, view, fresnel)
+    with formulas.frame("Bent closure"):
+        bent = _bent(inputs, view, lobe, fresnel)
+    with formulas.frame("Broad closure"):
+        broad = _broad(inputs, view, lobe, fresnel)
     with formulas.frame("Closures"):
-        _shaders(formulas, inputs, view, closure)
+        _shaders(formulas, inputs, view, fresnel, [bent, broad])
     formulas.tidy()
 
 
@@ -209,137 +222,139 @@ def _view(formulas: NodeFormulas, inputs: _Inputs) -> _View:
     incoming = Vector(formulas, formulas.node("ShaderNodeNewGeometry").outputs["Incoming"])
     cosine = incoming.dot(inputs.normal)
     across = incoming - inputs.normal * cosine
+    cosine = cosine.at_least(1e-3).named("cos theta")
+    sine = across.length().named("sin theta")
+    tan = (sine / cosine).named("tan theta")
     return _View(
         tangent=(across + TINY_TANGENT).normalised().named("tangent"),
-        cosine=cosine.at_least(1e-3).named("cos theta"),
-        sine=across.length().named("sin theta"),
+        cosine=cosine,
+        sine=sine,
+        sine2=(sine * sine).named("sin2 theta"),
+        tan=tan,
+        tan2=(tan * tan).named("tan2 theta"),
     )
 
 
-def _lobe(inputs: _Inputs, view: _View) -> _Lobe:
-    s, alpha = inputs.exponent, inputs.interpolation
-    tan_o = (view.sine / view.cosine).named("tan theta")
-    s1 = s + 1
-    root = (s1 * s1 + 4 * s * (tan_o * tan_o)).sqrt()
-    x = (2 * tan_o / (s1 + root)).named("tan 2 tau")
-    y = (x / ((x * x + 1).sqrt() + 1)).named("tan tau")
-    p = (1 / (y * y + 1)).named("cos2 tau")
-    e = (y * y * p).named("sin2 tau")
-    alpha_e = alpha * e
-    missing = e * (2 - alpha_e)
-    base = (1 - missing).named("base")
-    r = missing / (base + 1)
-    r2 = r * r
-    log_base = (-2 * r * (r2 * (r2 * 0.2 + 1 / 3) + 1)).named("ln base")
-    base_slope = y * p * (alpha_e * -2 + 2) / base
-    bends = (1 - alpha) * (e * -2 + 1) + alpha * p * (e * -4 + 1)
-    tan_i = s * x
-    tan2_i = tan_i * tan_i
-    curvature = s * (bends / base + base_slope * base_slope) + 1 + tan2_i
-    return _Lobe(
-        y=y,
-        p=p,
-        m=(alpha * p * p / base).named("m"),
-        log_base=log_base,
-        tan2_i=tan2_i,
-        slope=(s * (base_slope - x)).named("slope"),
-        curvature=curvature.named("H"),
-        z=(tan2_i / curvature).named("z"),
-    )
-
-
-def _fresnel(inputs: _Inputs, tangent: Scalar) -> _Fresnel:
-    """R_F at the peak and the derivatives of its logarithm: see live_lobe.h, step 4."""
-    excess = (inputs.ior - 1) * (inputs.ior + 1)
-    tan2 = tangent * tangent
-    v = excess * (tan2 + 1)
+def _fresnel(inputs: _Inputs, view: _View) -> _Fresnel:
+    """R_F at the viewer's angle and what it does there: see live_lobe.h, step 4."""
+    less, more = inputs.ior - 1, inputs.ior + 1
+    excess = less * more
+    v = excess * (view.tan2 + 1)
     d = v / ((v + 1).sqrt() + 1)
-    h = v / (v + 1)
     rs = (d / (d + 2)).named("r_s")
-    rp = ((d - excess) / (d + 2 + excess)).named("r_p")
+    rp = ((d - excess) / (d + excess + 2)).named("r_p")
     s2, p2 = rs * rs, rp * rp
-    reflectance = ((s2 + p2) * 0.5).named("R_F")
-    value = ((reflectance - 1) * inputs.fresnel + 1).named("F")
-    share = inputs.fresnel / value
-    free_s, free_p = 1 - s2, 1 - p2
-    first = share * ((rs * free_s + rp * free_p) * 0.5)
-    second = share * (((s2 * -3 + 1) * free_s + (p2 * -3 + 1) * free_p) * 0.25)
-    bend = h * (tan2 * (h * -2 + 3) + 1)
-    slope = first * h
+
+    def blended(reflectance: Scalar) -> Scalar:
+        return (reflectance - 1) * inputs.fresnel + 1
+
+    value = blended((s2 + p2) * 0.5).named("F")
+    root = less / more
+    facing = blended(root * root).named("F facing")
+    slope = (rs * (1 - s2) + rp * (1 - p2)) * (v / (v + 1)) * (inputs.fresnel / value)
     return _Fresnel(
         value=value,
-        slope=slope.named("(ln F)' / tan"),
-        curvature=(first * bend + tan2 * (second * (h * h) - slope * slope)).named("(ln F)''"),
+        phi=(slope * 0.25).named("phi"),
+        rise=((value - facing) / (value + facing)).named("rise"),
     )
 
 
-def _closure(
-    inputs: _Inputs, view: _View, lobe: _Lobe, fresnel: _Fresnel, tan_peak: Scalar
-) -> _Closure:
-    s, alpha, y, p, z = inputs.exponent, inputs.interpolation, lobe.y, lobe.p, lobe.z
-    curvature = fresnel.curvature * -0.25 + lobe.curvature
-    curvature = curvature.at_least(lobe.curvature * LEAST_CURVATURE).named("curvature")
-    slope = fresnel.slope * tan_peak * 0.5 + lobe.slope
-    step = slope / curvature
-    # The mirror direction of the bent normal stays above the horizon.
-    lowest = -0.9 * view.cosine / (view.sine + 1)
-    tilt = (step * -0.5 + y) * (z * (z * TILT_ZZ + TILT_Z) + 1)
-    tilt = tilt.at_least(lowest).named("tan tilt")
-    moved = 2 * p * (y - tilt)
+def _lobe(inputs: _Inputs, view: _View, fresnel: _Fresnel) -> _Lobe:
+    s, alpha = inputs.exponent, inputs.interpolation
+    pull = (1 - fresnel.phi).at_least(LEAST_PULL).named("pull")
+    total = s + pull
+    root = (total * total + s * pull * 4 * view.tan2).sqrt()
+    x = (pull * view.tan * 2 / (total + root)).named("tan 2 tau")
+    x2 = x * x
+    y = (x / ((x2 + 1).sqrt() + 1)).named("tan tau")
+    y2 = y * y
+    e = (y2 / (y2 + 1)).named("sin2 tau")
+    missing = (e * (2 - alpha * e)).named("1 - base")
+    tan_i = s * x / pull
+    tan2_i = tan_i * tan_i
+    sec2_i = tan2_i + 1
+    own = s * (x2 * (alpha * -0.75 + 1) + 1)
+    curvature = ((pull * 0.5 + 0.5) * sec2_i + own).named("H")
+    wide = (1 / (s + 1)).named("wide")
+    return _Lobe(
+        tan_tau=y,
+        log_base=(missing * -2 / (2 - missing)).named("ln base"),
+        sec2_i=sec2_i,
+        curvature=curvature,
+        z=(pull * tan2_i / curvature).named("z"),
+        wide=wide,
+        wide_rise=wide * fresnel.rise,
+    )
 
+
+def _bent(inputs: _Inputs, view: _View, lobe: _Lobe, fresnel: _Fresnel) -> _Closure:
+    s, alpha, phi, z, wide = inputs.exponent, inputs.interpolation, fresnel.phi, lobe.z, lobe.wide
+    wide_uu = wide * (view.sine2 * view.sine2)
+    log_tilt = wide_uu * TILT_UU + lobe.wide_rise * TILT_RISE
+    log_tilt = z * (view.sine2 * TILT_ZU + TILT_Z) + log_tilt
+    tilt = (lobe.tan_tau * log_tilt.exp()).named("tan tilt")
     shrink = (tilt * tilt + 1).inverse_sqrt()
-    c = ((view.cosine + view.sine * tilt) * shrink).named("c")
-    d = ((view.sine - view.cosine * tilt) * shrink).named("d")
-    c2, cd = c * c, c * d
-    across = s * (c2 + lobe.m * (tilt * cd * -2 + d * d)) + c2
-    j = fresnel.slope * (c2 * -0.5 + 0.25) + across
-    j = j.at_least(across * LEAST_CURVATURE).named("j")
-    ratio = cd / j
-    q = (ratio * ratio * curvature * (1 / 16)).named("q")
-    offset = alpha * OFFSET_ALPHA + 2
-    zz = z * z
-    inverse_x2 = 2 * curvature * (zz * X_ZZ + 1) / (q * X_Q + 1) + offset
-    inverse_y2 = 2 * j * (z * lobe.m * Y_Z + 1) / (q * Y_Q + 1) + offset
-
-    log_peak = s * lobe.log_base + moved * (curvature * moved * -0.5 + slope)
-    correction = (zz * WEIGHT_ZZ + alpha / (s + 1) * WEIGHT_ALPHA + 1) / (q * WEIGHT_Q + 1)
-    masking = 2 * _beckmann_lambda(d * d / (c2 * inverse_x2)) + 1
-    peak = log_peak.exp() * fresnel.value * correction * masking
-    size = (inverse_x2 * inverse_y2 * (lobe.tan2_i + 1)).inverse_sqrt()
+    c = ((view.sine * tilt + view.cosine) * shrink).named("c")
+    c2 = c * c
+    across = s * ((1 - alpha) * c2 + alpha) + (phi * (0.5 - c2) + c2)
+    both = wide * (wide * BOTH_WIDE + (alpha * BOTH_ALPHA + BOTH))
+    phi2 = phi * phi
+    log_x = wide * (z * (wide * X_ZWIDE + X_Z) + phi * (wide * phi * X_PHI2 + X_PHI)) + both
+    log_y = wide * z * (z * Y_ZZ + Y_Z) + both
+    log_weight = wide * WEIGHT_WIDE + (alpha * WEIGHT_ALPHA + z * z * WEIGHT_ZZ)
+    log_weight = phi2 * WEIGHT_PHI2 + (fresnel.rise * WEIGHT_RISE + log_weight)
+    log_peak = s * lobe.log_base + phi * view.tan * (tilt * shrink) * -2 + wide * log_weight
     return _Closure(
-        tilt=tilt,
-        inverse_x2=inverse_x2.named("1 / alpha_x^2"),
-        inverse_y2=inverse_y2.named("1 / alpha_y^2"),
-        weight=(4 * math.pi * c * peak * size).named("weight for k_s = 1"),
+        inverse_x2=(lobe.curvature * log_x.exp() * 2 + 1).named("1 / alpha_x^2"),
+        inverse_y2=(across * log_y.exp() * 2 + 1).named("1 / alpha_y^2"),
+        amount=(c * log_peak.exp() * lobe.sec2_i.inverse_sqrt()).named("amount"),
+        normal=(view.tangent * tilt + inputs.normal).named("bent normal"),
     )
 
 
-def _beckmann_lambda(q: Scalar) -> Scalar:
-    """Lambda of Cycles' Beckmann masking for q = (alpha tan theta)^2."""
-    c = q.inverse_sqrt()
-    masked = (c * (c * 0.396 - 1.259) + 1) / (c * (c * 2.181 + 3.535))
-    return (masked * q.is_over(0.39)).named("Lambda")
+def _broad(inputs: _Inputs, view: _View, lobe: _Lobe, fresnel: _Fresnel) -> _Closure:
+    s, alpha, phi, z, wide = inputs.exponent, inputs.interpolation, fresnel.phi, lobe.z, lobe.wide
+    both = wide * wide * BROAD_WIDE
+    log_x = z * (z * BROAD_X_ZZ + BROAD_X_Z) + (lobe.wide_rise * BROAD_X_RISE + both)
+    log_y = phi * phi * BROAD_Y_PHI2 + (alpha * z * BROAD_Y_ALPHA + both)
+    across = s * ((alpha - 1) * view.sine2 + 1)
+    log_share = z * (wide * z * SHARE_ZZ + (phi * SHARE_ZPHI + SHARE_Z))
+    log_share = lobe.wide_rise * SHARE_RISE + (wide * SHARE_WIDE + SHARE) + log_share
+    share = (wide * log_share.exp() + -SHARE_END).at_least(0.0).named("share")
+    return _Closure(
+        inverse_x2=(s * log_x.exp() + 1).named("1 / alpha_x^2"),
+        inverse_y2=(across * log_y.exp() + 1).named("1 / alpha_y^2"),
+        amount=(view.cosine * share).named("amount"),
+        normal=inputs.normal,
+    )
 
 
-def _shaders(formulas: NodeFormulas, inputs: _Inputs, view: _View, closure: _Closure) -> None:
-    # Cycles takes sqrt(alpha) as roughness, and the ratio of the two alphas as anisotropy.
-    roughness = (closure.inverse_x2 * closure.inverse_y2).inverse_sqrt().sqrt().sqrt()
-    ratio = (closure.inverse_y2 / closure.inverse_x2).sqrt().sqrt()
-    anisotropy = (1 - ratio) / ratio.at_least(1.0)
+def _shaders(
+    formulas: NodeFormulas,
+    inputs: _Inputs,
+    view: _View,
+    fresnel: _Fresnel,
+    closures: list[_Closure],
+) -> None:
     k_s = inputs.strength / normal_albedo(inputs.exponent, inputs.interpolation)
-    specular = formulas.node(
-        "ShaderNodeBsdfAnisotropic",
-        Color=inputs.specular_color * (k_s.named("k_s") * closure.weight),
-        Roughness=roughness.named("roughness"),
-        Anisotropy=anisotropy.named("anisotropy"),
-        Normal=(inputs.normal + view.tangent * closure.tilt).named("bent normal"),
-        Tangent=view.tangent,
-    )
-    specular.distribution = "BECKMANN"
-    diffuse = formulas.node("ShaderNodeBsdfDiffuse", Color=inputs.base_color, Normal=inputs.normal)
-    both = formulas.node("ShaderNodeAddShader")
-    output = formulas.node("NodeGroupOutput")
+    strength = k_s.named("k_s") * fresnel.value * (4 * math.pi)
     links = formulas.tree.links
-    links.new(specular.outputs[0], both.inputs[0])
-    links.new(diffuse.outputs[0], both.inputs[1])
-    links.new(both.outputs[0], output.inputs[0])
+    total = formulas.node("ShaderNodeBsdfDiffuse", Color=inputs.base_color, Normal=inputs.normal)
+    for closure in closures:
+        # Cycles takes sqrt(alpha) as roughness, and the ratio of the two alphas as anisotropy.
+        alpha2 = (closure.inverse_x2 * closure.inverse_y2).inverse_sqrt()
+        ratio = (closure.inverse_y2 / closure.inverse_x2).sqrt().sqrt()
+        specular = formulas.node(
+            "ShaderNodeBsdfAnisotropic",
+            Color=inputs.specular_color * (strength * closure.amount * alpha2),
+            Roughness=alpha2.sqrt().sqrt().named("roughness"),
+            Anisotropy=((1 - ratio) / ratio.at_least(1.0)).named("anisotropy"),
+            Normal=closure.normal,
+            Tangent=view.tangent,
+        )
+        specular.distribution = "BECKMANN"
+        both = formulas.node("ShaderNodeAddShader")
+        links.new(specular.outputs[0], both.inputs[0])
+        links.new(total.outputs[0], both.inputs[1])
+        total = both
+    links.new(total.outputs[0], formulas.node("NodeGroupOutput").inputs[0])

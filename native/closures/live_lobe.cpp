@@ -8,40 +8,47 @@
 namespace lobefit {
 namespace {
 
-// The fitted factors; the same numbers stand in addon/nodes/live.py.
+// The fitted numbers of the corrections, by what is corrected and what they are multiplied by; the
+// same stand in addon/nodes/live.py.
 struct Correction {
-  static constexpr double least_curvature = 0.87;
-  static constexpr double tilt_z = 0.59, tilt_zz = -1.71;
-  static constexpr double offset_alpha = -0.77;
-  static constexpr double x_zz = -1.16, x_q = 1;
-  static constexpr double y_z = 0.04, y_q = 12.5;
-  static constexpr double weight_zz = -0.31, weight_alpha = -0.14, weight_q = 0.61;
+  static constexpr double tilt_z = 2.53, tilt_zu = -2.21, tilt_uu = -0.398, tilt_rise = -5.28;
+  static constexpr double both = 0.482, both_wide = 0.741, both_alpha = -0.342;
+  static constexpr double x_z = 6.34, x_zwide = -9.81, x_phi = -1.21, x_phi2 = 0.888;
+  static constexpr double y_z = 2.56, y_zz = 10.6;
+  static constexpr double weight_zz = -27.2, weight_wide = -0.426, weight_alpha = -0.115,
+                          weight_phi2 = 0.223, weight_rise = -1.49;
+  static constexpr double broad_wide = 1.11;
+  static constexpr double broad_x_z = -2.12, broad_x_zz = 6.95, broad_x_rise = 1.9;
+  static constexpr double broad_y_alpha = 1.79, broad_y_phi2 = -0.975;
+  static constexpr double share = -1.95, share_wide = 0.958, share_rise = -1.28;
+  static constexpr double share_z = 6.78, share_zz = -15, share_zphi = -2.18;
+  static constexpr double share_end = 0.004;
 };
+
+// (ln F)' of Fresnel pulls the peak toward the horizon, the light's cosine away from it; at least
+// this much of the latter is left.
+constexpr double least_pull = 0.05;
 
 double square(double x) { return x * x; }
 
-// F at an angle of the given tangent, (ln F)' / tangent and (ln F)'', by the angle.
-struct FresnelSlope {
+// F, half of (ln F)' / tan (phi) and (F - F0) / (F + F0), F0 at normal incidence (rise).
+struct Fresnel {
   double value;
-  double slope;
-  double curvature;
+  double phi;
+  double rise;
 };
 
-FresnelSlope fresnel_slope(double tangent, double ior, double fresnel) {
-  const double excess = (ior - 1) * (ior + 1);
-  const double tan2 = square(tangent);
+Fresnel fresnel_terms(double tan2, double ior, double fresnel) {
+  const double less = ior - 1, more = ior + 1, excess = less * more;
   const double v = excess * (1 + tan2);         // u^2 - 1
   const double d = v / (1 + std::sqrt(1 + v));  // u - 1
-  const double h = v / (1 + v);
   const double rs = d / (2 + d), rp = (d - excess) / (2 + d + excess);
   const double s2 = square(rs), p2 = square(rp);
-  const double value = 1 - fresnel + fresnel * (s2 + p2) / 2;
+  const double value = 1 + fresnel * ((s2 + p2) / 2 - 1);
   if (!(value > 0)) return {0, 0, 0};
-  const double first = fresnel / value * (rs * (1 - s2) + rp * (1 - p2)) / 2;
-  const double second = fresnel / value * ((1 - 3 * s2) * (1 - s2) + (1 - 3 * p2) * (1 - p2)) / 4;
-  const double bend = h * (1 + tan2 + 2 * tan2 * (1 - h));
-  const double slope = first * h;
-  return {value, slope, first * bend + tan2 * (second * h * h - square(slope))};
+  const double facing = 1 + fresnel * (square(less / more) - 1);
+  const double slope = fresnel / value * (rs * (1 - s2) + rp * (1 - p2)) * v / (1 + v);
+  return {value, slope / 4, (value - facing) / (value + facing)};
 }
 
 }  // namespace
@@ -51,59 +58,59 @@ double normal_albedo(double exponent, double interpolation) {
   return 2 * pi / (s + 2 - interpolation * s * (1.19 + s / 2) / (5.02 + s * (3.41 + s)));
 }
 
-LiveClosure live_closure(double cos_view, double exponent, double interpolation, double ior,
-                         double fresnel) {
+LiveClosures live_closures(double cos_view, double exponent, double interpolation, double ior,
+                           double fresnel) {
   using C = Correction;
   const double s = exponent, alpha = interpolation;
-  const double cos_o = std::clamp(cos_view, 1e-3, 1.0);
-  const double sin_o = std::sqrt(1 - square(cos_o)), tan_o = sin_o / cos_o;
+  const double cos_o = std::clamp(cos_view, 1e-3, 1.0), sin2_o = 1 - square(cos_o);
+  const double sin_o = std::sqrt(sin2_o), tan_o = sin_o / cos_o, tan2_o = square(tan_o);
+  const Fresnel f = fresnel_terms(tan2_o, ior, fresnel);
 
-  // The peak of the Phong lobe: x = tan 2tau, y = tan tau, p = cos^2 tau.
-  const double x = 2 * tan_o / (s + 1 + std::sqrt(square(s + 1) + 4 * s * square(tan_o)));
-  const double y = x / (1 + std::sqrt(1 + square(x)));
-  const double p = 1 / (1 + square(y)), e = square(y) * p;
+  // The peak of the Phong lobe: x = tan 2tau, y = tan tau, e = sin^2 tau.
+  const double pull = std::max(1 - f.phi, least_pull), sum = s + pull;
+  const double x = 2 * pull * tan_o / (sum + std::sqrt(square(sum) + 4 * s * pull * tan2_o));
+  const double x2 = square(x), y = x / (1 + std::sqrt(1 + x2));
+  const double e = square(y) / (1 + square(y)), missing = e * (2 - alpha * e);
+  const double log_base = -2 * missing / (2 - missing);
+  const double tan2_i = square(s * x / pull), sec2_i = 1 + tan2_i;
+  const double curvature = s * (1 + x2 * (1 - 0.75 * alpha)) + (1 + pull) / 2 * sec2_i;
 
-  // The lobe there. ln base is a series because 1 - base drowns in single precision.
-  const double missing = e * (2 - alpha * e), base = 1 - missing;
-  const double r = missing / (1 + base);
-  const double log_base = -2 * r * (1 + square(r) * (1.0 / 3 + square(r) / 5));
-  const double base_slope = 2 * y * p * (1 - alpha * e) / base;
-  const double base_curvature =
-      ((1 - alpha) * (1 - 2 * e) + alpha * p * (1 - 4 * e)) / base + square(base_slope);
-  const double tan2_i = square(s * x);
-  const double lobe_curvature = s * base_curvature + 1 + tan2_i;
-  const double z = tan2_i / lobe_curvature;
+  const double z = pull * tan2_i / curvature, wide = 1 / (s + 1);
+  const double phi2 = square(f.phi), wide_rise = wide * f.rise;
 
-  // Fresnel there, and the Newton step.
-  const double tan_peak = (sin_o - cos_o * y) / (cos_o + sin_o * y);
-  const FresnelSlope f = fresnel_slope(tan_peak, ior, fresnel);
-  const double curvature =
-      std::max(lobe_curvature - f.curvature / 4, C::least_curvature * lobe_curvature);
-  const double slope = s * (base_slope - x) + f.slope * tan_peak / 2;
-  const double step = slope / curvature;
-  // The mirror direction of the bent normal stays above the horizon.
-  const double tilt =
-      std::max((y - step / 2) * (1 + z * (C::tilt_z + C::tilt_zz * z)), -0.9 * cos_o / (1 + sin_o));
-  const double moved = 2 * p * (y - tilt);
-
-  // The widths about the bent normal.
+  // The bent closure.
+  const double tilt = y * std::exp(z * (C::tilt_z + C::tilt_zu * sin2_o) +
+                                   C::tilt_uu * wide * square(sin2_o) + C::tilt_rise * wide_rise);
   const double shrink = 1 / std::sqrt(1 + square(tilt));
-  const double c = (cos_o + sin_o * tilt) * shrink, d = (sin_o - cos_o * tilt) * shrink;
-  const double m = alpha * square(p) / base;
-  const double across = s * (c * c + m * (d * d - 2 * tilt * d * c)) + c * c;
-  const double j = std::max(across - f.slope * (2 * c * c - 1) / 4, C::least_curvature * across);
-  const double q = square(c * d / (4 * j)) * curvature;
-  const double offset = 2 + C::offset_alpha * alpha;
-  const double inverse_x2 = 2 * curvature * (1 + C::x_zz * z * z) / (1 + C::x_q * q) + offset;
-  const double inverse_y2 = 2 * j * (1 + C::y_z * z * m) / (1 + C::y_q * q) + offset;
+  const double c = (cos_o + sin_o * tilt) * shrink, c2 = square(c);
+  const double across = s * (alpha + (1 - alpha) * c2) + c2 - f.phi * (c2 - 0.5);
+  const double both = wide * (C::both + C::both_wide * wide + C::both_alpha * alpha);
+  const double log_x =
+      both + wide * (z * (C::x_z + C::x_zwide * wide) + C::x_phi * f.phi + C::x_phi2 * wide * phi2);
+  const double log_y = both + wide * z * (C::y_z + C::y_zz * z);
+  const double inverse_x2 = 1 + 2 * curvature * std::exp(log_x);
+  const double inverse_y2 = 1 + 2 * across * std::exp(log_y);
+  const double log_peak =
+      s * log_base - 2 * f.phi * tan_o * tilt * shrink +
+      wide * (C::weight_zz * z * z + C::weight_wide * wide + C::weight_alpha * alpha +
+              C::weight_phi2 * phi2 + C::weight_rise * f.rise);
+  const double weight =
+      4 * pi * f.value * c * std::exp(log_peak) / std::sqrt(inverse_x2 * inverse_y2 * sec2_i);
 
-  const double log_peak = s * log_base + moved * (slope - curvature * moved / 2);
-  const double correction =
-      (1 + C::weight_zz * z * z + C::weight_alpha * alpha / (s + 1)) / (1 + C::weight_q * q);
-  const double masking = 1 + 2 * beckmann_lambda(square(d / c) / inverse_x2);
-  const double weight = 4 * pi * c * masking * std::exp(log_peak) * f.value * correction /
-                        std::sqrt(inverse_x2 * inverse_y2 * (1 + tan2_i));
-  return {tilt, 1 / std::sqrt(inverse_x2), 1 / std::sqrt(inverse_y2), weight};
+  // The broad one.
+  const double broad = C::broad_wide * wide * wide;
+  const double broad_log_x =
+      broad + z * (C::broad_x_z + C::broad_x_zz * z) + C::broad_x_rise * wide_rise;
+  const double broad_log_y = broad + C::broad_y_alpha * alpha * z + C::broad_y_phi2 * phi2;
+  const double broad_x2 = 1 + s * std::exp(broad_log_x);
+  const double broad_y2 = 1 + s * (alpha + (1 - alpha) * square(cos_o)) * std::exp(broad_log_y);
+  const double log_share = C::share + C::share_wide * wide + C::share_rise * wide_rise +
+                           z * (C::share_z + C::share_zz * wide * z + C::share_zphi * f.phi);
+  const double share = std::max(wide * std::exp(log_share) - C::share_end, 0.0);
+  const double broad_weight = 4 * pi * f.value * cos_o * share / std::sqrt(broad_x2 * broad_y2);
+
+  return {{tilt, 1 / std::sqrt(inverse_x2), 1 / std::sqrt(inverse_y2), weight},
+          {0, 1 / std::sqrt(broad_x2), 1 / std::sqrt(broad_y2), broad_weight}};
 }
 
 Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo) {
@@ -113,17 +120,21 @@ Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo
   const double sine = std::hypot(wo.x(), wo.y());
   const Vector3 tangent =
       sine > 0 ? Vector3(wo.x() / sine, wo.y() / sine, 0) : Vector3(Vector3::UnitX());
+  const auto evaluate = [&](const LiveClosure& closure) {
+    const double shrink = 1 / std::sqrt(1 + square(closure.tilt));
+    const Beckmann bent{(normal + closure.tilt * tangent) * shrink,
+                        (tangent - closure.tilt * normal) * shrink, closure.alpha_x,
+                        closure.alpha_y};
+    return closure.weight * evaluate_beckmann(bent, wi, wo);
+  };
   Rgb result = lobe.diffuse / pi * wi.z();
   for (int c = 0; c < 3; ++c) {
     const double exponent = std::clamp(lobe.exponent[c], 0.0, live_exponent_limit);
-    const LiveClosure at =
-        live_closure(wo.z(), exponent, lobe.interpolation, lobe.ior.value_or(1), lobe.ior ? 1 : 0);
-    const double shrink = 1 / std::sqrt(1 + square(at.tilt));
-    const Beckmann closure{(normal + at.tilt * tangent) * shrink,
-                           (tangent - at.tilt * normal) * shrink, at.alpha_x, at.alpha_y};
+    const LiveClosures at =
+        live_closures(wo.z(), exponent, lobe.interpolation, lobe.ior.value_or(1), lobe.ior ? 1 : 0);
     const double same_albedo = normal_albedo(lobe.exponent[c], lobe.interpolation) /
                                normal_albedo(exponent, lobe.interpolation);
-    result[c] += lobe.specular[c] * same_albedo * at.weight * evaluate_beckmann(closure, wi, wo);
+    result[c] += lobe.specular[c] * same_albedo * (evaluate(at.bent) + evaluate(at.broad));
   }
   return result;
 }

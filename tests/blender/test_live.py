@@ -208,6 +208,7 @@ def test_specular_coefficient_comes_back(addon, build, exponent, interpolation):
     [
         {"exponent": 5.0, "interpolation": 0.0},
         {"exponent": 2.0, "interpolation": 0.7, "ior": 1.2},
+        {"exponent": 0.2, "interpolation": 0.3, "ior": 1.5},
         {"exponent": 60.0, "interpolation": 1.0, "ior": 1.5},
         {"exponent": 900.0, "interpolation": 0.5, "ior": 2.5, "specular": [90.0, 70.0, 50.0]},
         {"exponent": [20.0, 80.0, 20.0], "interpolation": 0.2, "ior": 1.4},
@@ -220,22 +221,28 @@ def test_cycles_computes_what_the_mirror_does(build, render, changes):
     for phase in (8, 47, 101, 152):
         expected = mirrored(lobe(**changes), light_at(phase), normals)
         difference = np.abs(render(material, light_at(phase)) - expected)
-        # Single precision against double; Cycles' own figures agree to 1e-4 of a peak.
-        assert difference.max() < 1e-3 * expected.max()
+        # Single precision against double: 1e-4 of a peak. But Cycles leaves out a closure whose
+        # weight is below 1e-5, which is up to 2e-3 where the broad one ends.
+        assert difference.max() < 2e-3 * expected.max()
 
 
 @pytest.mark.parametrize(
     ("exponent", "interpolation", "ior", "bound"),
-    # About a tenth above what is left: the second order leaves out what grows as 1 / exponent,
+    # About a tenth above what is left: two closures leave out what grows as 1 / exponent,
     # most of it at the last phase, where only light that all but grazes is seen.
     [
-        (5.0, 0.5, None, 0.185),
-        (15.0, 0.0, None, 0.075),
-        (50.0, 0.0, None, 0.028),
-        (50.0, 0.5, None, 0.016),
-        (50.0, 1.0, 1.5, 0.018),
-        (500.0, 0.5, None, 0.0025),
-        (5000.0, 1.0, 1.5, 0.002),
+        (0.3, 0.5, 1.5, 0.099),
+        (1.0, 0.0, None, 0.128),
+        (1.0, 0.5, 1.5, 0.073),
+        (5.0, 0.0, None, 0.066),
+        (5.0, 0.5, None, 0.052),
+        (5.0, 1.0, 1.5, 0.046),
+        (15.0, 0.0, None, 0.053),
+        (50.0, 0.0, None, 0.0275),
+        (50.0, 0.5, None, 0.0123),
+        (50.0, 1.0, 1.5, 0.0178),
+        (500.0, 0.5, None, 0.0008),
+        (5000.0, 1.0, 1.5, 0.001),
     ],
 )
 def test_cycles_renders_the_formula(build, render, exponent, interpolation, ior, bound):
@@ -300,11 +307,22 @@ def test_a_connected_normal_is_used(build, render):
 
 
 @pytest.mark.parametrize("flip", [False, True])
-def test_a_facing_disc_has_no_black_pixels(build, render, flip):
+@pytest.mark.parametrize("exponent", [0.5, 50.0])
+def test_a_facing_disc_has_no_black_pixels(build, render, exponent, flip):
     flat = np.tile(UP, (SIZE * SIZE, 1))
-    expected = mirrored(lobe(ior=1.5), light_at(20), flat)
-    rendered = render(build(ior=1.5), light_at(20), flat, flip=flip)
+    expected = mirrored(lobe(ior=1.5, exponent=exponent), light_at(20), flat)
+    rendered = render(build(ior=1.5, exponent=exponent), light_at(20), flat, flip=flip)
     assert np.allclose(rendered, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [0.2, 4.0, 300.0])
+def test_a_facing_disc_looks_the_same_from_all_sides(build, render, exponent):
+    # The tangent turns with the normal, whose direction is what rounding leaves of it here: two
+    # roughnesses that differed would make the disc swirl.
+    tilts = np.random.default_rng(3).normal(0, 1e-5, (SIZE * SIZE, 3)) * [1, 1, 0]
+    rendered = render(build(ior=1.5, exponent=exponent), light_at(35), UP + tilts)
+    # A lobe of this exponent changes by so much where the normal turns by 1e-5.
+    assert np.ptp(rendered, axis=0).max() < (1e-4 + 2e-4 * exponent**0.5) * rendered.max()
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.3, 1e8])
