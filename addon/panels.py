@@ -2,16 +2,18 @@
 
 import textwrap
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import bpy
 
 from . import native
+from .nodes.material import shown_by
 from .operators.fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .operators.import_measured import LOBEFIT_OT_import_measured
 from .operators.preview import LOBEFIT_OT_preview, icons_of
 from .operators.run import current
-from .properties import MODELS, draw_fit_options
+from .properties import KINDS, MODELS, draw_fit_options
 from .records import active_material, record_of
 
 TITLE = "Measured BRDF"
@@ -47,6 +49,7 @@ class LOBEFIT_PT_measured_brdf(_MaterialPanel, bpy.types.Panel):
         if current():
             draw_progress(body)
         _draw_record(body, record, _characters(context))
+        _draw_error(body, material, record, _characters(context))
         _draw_fit(body, context)
         _draw_preview(body, material)
 
@@ -94,7 +97,6 @@ def _draw_hint(layout: Any, material: bpy.types.Material | None, characters: int
 
 def _draw_record(layout: Any, record: dict[str, Any], characters: int) -> None:
     source, parameters = record["source"], record["parameters"]
-    error = record["error"]["relative_l1_cosine"]["pooled"]
     column = layout.column(align=True)
     for name, value in {
         "Source": Path(source["path"]).name if source["path"] else source["format"],
@@ -109,12 +111,21 @@ def _draw_record(layout: Any, record: dict[str, Any], characters: int) -> None:
             split = column.split(factor=0.35)
             split.label(text=name)
             split.label(text=value)
-    if error is not None:
-        judgement = next(text for limit, text in _JUDGEMENTS if error <= limit)
-        sentence = f"{judgement}: {error:.1%} of the reflected light is off."
-        _paragraph(layout, sentence, "INFO", characters)
     for warning in record["warnings"]:
         _paragraph(layout, warning, "ERROR", characters)
+
+
+def _draw_error(
+    layout: Any, material: bpy.types.Material, record: dict[str, Any], characters: int
+) -> None:
+    whole = SimpleNamespace(**{"closures": [], **record})
+    choice = shown_by(material, whole)
+    kind = {key: label for key, label, _ in KINDS}[choice.kind]
+    closures = f", {choice.count} specular closures" if choice.closures else ""
+    error = choice.error(whole)
+    judgement = next(text for limit, text in _JUDGEMENTS if error <= limit)
+    sentence = f"{kind}{closures}. {judgement}: {error:.1%} of the reflected light is off."
+    _paragraph(layout, sentence, "INFO", characters)
 
 
 def _draw_fit(layout: Any, context: bpy.types.Context) -> None:

@@ -6,7 +6,9 @@ What the user chose last lives with the operator (`operator_properties_last`) an
 
 from typing import Any
 
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from .nodes.material import BAKED
 
 MODELS = (
     ("interpolated", "Interpolated", "A blend of the two others, and closer than both"),
@@ -21,8 +23,41 @@ NORMS = (
 )
 
 
+KINDS = (
+    ("measured", "Measured", "The measurement itself by a few closures: the closest picture"),
+    ("lobe", "Lobe", "The fitted lobe by a few closures: the model, faithfully"),
+    ("live", "Live", "The fitted lobe with every parameter a socket, to edit and animate"),
+    ("principled", "Principled", "The nearest Principled BSDF, as every other program shows it"),
+    ("auto", "Auto", "The cheapest of these that is within the tolerance"),
+)
+
+
 class FitOptions:
-    """How to fit; mixed into operators."""
+    """How to fit and what to make of it; mixed into operators."""
+
+    kind: EnumProperty(
+        name="Kind", items=KINDS, default="measured", description="What Cycles renders"
+    )
+    count: IntProperty(
+        name="Closures",
+        default=2,
+        min=0,
+        max=3,
+        description="Specular closures of the kinds Measured and Lobe, besides a diffuse one",
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        default=5.0,
+        min=0.0,
+        max=100.0,
+        subtype="PERCENTAGE",
+        description="How much of the reflected light the kind Auto may have off",
+    )
+    cap_albedo: BoolProperty(
+        name="Cap Albedo",
+        default=False,
+        description="Let no view angle reflect more light than arrives, as some measurements do",
+    )
 
     model: EnumProperty(
         name="Model", items=MODELS, default="interpolated", description="The lobe to fit"
@@ -45,10 +80,26 @@ class FitOptions:
 
     def fit_options(self) -> dict[str, Any]:
         """The options as `lobefit.start_fit` takes them."""
-        return {name: getattr(self, name) for name in FitOptions.__annotations__}
+        from lobefit import closures_for
+
+        closures = closures_for(self.kind, self.count, self.tolerance / 100, self.cap_albedo)
+        names = ("model", "fresnel", "norm", "threads")
+        return {"closures": closures} | {name: getattr(self, name) for name in names}
+
+    def material_options(self) -> dict[str, Any]:
+        """The options as `build_material` takes them."""
+        count = self.count if self.kind in BAKED else None
+        return {"kind": self.kind, "count": count, "tolerance": self.tolerance / 100}
 
 
 def draw_fit_options(layout: Any, options: Any) -> None:
     """Draws the options; `options` is an operator or its last properties."""
-    for name in FitOptions.__annotations__:
+    layout.prop(options, "kind")
+    if options.kind in BAKED:
+        layout.prop(options, "count")
+    if options.kind == "auto":
+        layout.prop(options, "tolerance")
+    if options.kind in (*BAKED, "auto"):
+        layout.prop(options, "cap_albedo")
+    for name in ("model", "fresnel", "norm", "threads"):
         layout.prop(options, name)

@@ -68,6 +68,22 @@ class Choice:
         """How many specular closures are drawn."""
         return 0 if self.closures is None else len(self.closures["specular"])
 
+    def error(self, record: Any) -> float:
+        """The part of the light that is off, of the live kind that of the lobe it shows."""
+        if self.closures is not None:
+            return self.closures["error"]
+        if self.kind == "principled":
+            return record.principled["error"]
+        return record.error["relative_l1_cosine"]["pooled"] or 0.0
+
+    def shown(self, record: Any) -> tuple[str, Mapping[str, Any]]:
+        """What Cycles shows, as `lobefit.preview` takes it."""
+        if self.closures is not None:
+            return "closures", self.closures
+        if self.kind == "principled":
+            return "principled", record.principled
+        return "live", record.parameters
+
 
 def choose(
     record: Any, kind: str, count: int | None = None, tolerance: float = TOLERANCE
@@ -91,6 +107,16 @@ def choose(
             "none; `lobefit closures` adds them."
         )
     return Choice(kind, max(found, key=lambda entry: entry["count"]))
+
+
+def shown_by(material: bpy.types.Material, record: Any) -> Choice:
+    """What a material made of the record shows; `live` in files from before there were kinds."""
+    kind = material.get(KIND_KEY, "live")
+    if kind not in BAKED:
+        return Choice(kind)
+    count = material.get(COUNT_KEY)
+    entries = [entry for entry in record.closures if entry["target"] == kind]
+    return Choice(kind, next(e for e in entries if len(e["specular"]) == count))
 
 
 def choices(record: Any, tolerance: float) -> list[Choice]:

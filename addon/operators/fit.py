@@ -43,7 +43,7 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
         if not found:
             return "The material was removed while its fit was under way."
-        fill_material(found[0], done[0].record)
+        fill_material(found[0], done[0].record, **self.material_options())
         return ""
 
 

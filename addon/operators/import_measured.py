@@ -46,7 +46,8 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
         return self.fit(context, [bpy.path.abspath(path) for path in paths])
 
     def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
-        materials = [build_material(outcome.record) for outcome in done]
+        options = self.material_options()
+        materials = [build_material(outcome.record, **options) for outcome in done]
         target = context.active_object if self.assign else None
         if target is not None and hasattr(target.data, "materials") and target.is_editable:
             target.active_material = materials[0]

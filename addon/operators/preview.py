@@ -7,6 +7,7 @@ import bpy.utils.previews
 import numpy as np
 
 from .. import native
+from ..nodes.material import shown_by
 from ..records import KEY, active_material, record_of
 
 IMAGE = "Lobefit Preview"
@@ -41,7 +42,9 @@ class LOBEFIT_OT_preview(bpy.types.Operator):
         material = active_material(context)
         try:
             record = lobefit.Record.from_json(material[KEY], material.name)
-            row = preview.row(record, preview.measurement_of(record), _SIZE)
+            measurement = preview.measurement_of(record)
+            shown = shown_by(material, record).shown(record)
+            row = preview.row(record, measurement, _SIZE, shown=shown)
         except lobefit.InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -6,6 +6,7 @@ import bpy
 
 from .. import native
 from ..jobs import Batch, Outcome
+from ..nodes.material import choose
 from ..properties import FitOptions
 
 _POLL = 0.1  # seconds between two looks at a fit
@@ -116,9 +117,10 @@ class RunsFits(FitOptions):
         if problem:
             return self.refuse(problem)
         for outcome in done:
-            error = outcome.record.error["relative_l1_cosine"]["pooled"]
-            seconds = outcome.record.seconds["total"]
-            message = f"{outcome.record.name}: {error:.1%} off, fitted in {seconds:.1f} s"
+            record = outcome.record
+            shown = choose(record, **self.material_options())
+            seconds = record.seconds["total"] + sum(entry["seconds"] for entry in record.closures)
+            message = f"{record.name}: {shown.error(record):.1%} off, fitted in {seconds:.1f} s"
             self.report({"INFO"}, message)
         # The file browser pushes its own step before a fit that begins there, so that the flag
         # UNDO would leave two.

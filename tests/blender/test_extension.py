@@ -117,8 +117,16 @@ def test_panel_with_another_material(addon):
 def test_panel_with_a_measured_material(addon, material):
     layout = draw_panel(material=material)
     assert layout.operators == ["fit", "preview"]
-    assert layout.properties == ["model", "fresnel", "norm", "threads"]
-    assert any("% of the reflected light" in text for text in layout.texts)
+    assert layout.properties == [
+        "kind",
+        "count",
+        "cap_albedo",
+        "model",
+        "fresnel",
+        "norm",
+        "threads",
+    ]
+    assert "% of the reflected light" in " ".join(layout.texts)
 
 
 def test_panel_shows_the_preview(addon, material):

@@ -18,8 +18,8 @@ def inside(radius):
 
 
 def test_preview_is_what_cycles_renders(two_lights, material):
-    parameters = json.loads(material["lobefit_record"])["parameters"]
-    preview = lobefit._native.preview(("live", parameters), SIZE)
+    closures = json.loads(material["lobefit_record"])["closures"][0]
+    preview = lobefit._native.preview(("closures", closures), SIZE)
     rendered = two_lights.render_pixels(two_lights.two_lights_scene(material, SIZE))
     difference = np.abs(preview - rendered)[inside(0.97)]
     # What differs is the mesh: its facets move a sharp highlight by a small part of a pixel.

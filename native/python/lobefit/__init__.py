@@ -10,7 +10,7 @@ Nothing here needs Blender; materials are built from a record by the package `lo
 
 from lobefit._native import Cancelled, InputError, Measurement
 from lobefit._native import version as __version__
-from lobefit.fitting import Closures, Job, closures, fit, read, start_fit
+from lobefit.fitting import Closures, Job, closures, closures_for, fit, read, start_fit
 from lobefit.record import Record
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "Record",
     "__version__",
     "closures",
+    "closures_for",
     "fit",
     "read",
     "start_fit",

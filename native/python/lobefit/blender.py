@@ -15,7 +15,7 @@ from lobefit._native import InputError
 from lobefit.atomic import written_aside
 from lobefit.record import Record
 
-KINDS = ("live", "principled")
+KINDS = ("measured", "lobe", "live", "principled", "auto")
 
 
 def need_blender() -> None:
@@ -28,29 +28,34 @@ def need_blender() -> None:
             )
 
 
-def write_blend(path: str | os.PathLike[str], record: Record, kind: str = "live") -> None:
-    """Writes a Blender file with the material of a record on a sphere under two lights."""
-    _two_lights_scene([record], kind, 512)
+def write_blend(
+    path: str | os.PathLike[str], record: Record, kind: str = "live", **options: Any
+) -> None:
+    """Writes a Blender file with the material of a record on a sphere under two lights.
+
+    `kind` and `options` are those of `lobefit_addon.build_material`.
+    """
+    _two_lights_scene([record], 512, kind, **options)
     _save(path)
 
 
-def write_library(path: str | os.PathLike[str], records: list[Record]) -> None:
+def write_library(path: str | os.PathLike[str], records: list[Record], kind: str = "live") -> None:
     """Writes a Blender file with the materials of all records, the first of them on a sphere."""
-    _two_lights_scene(records, "live", 512)
+    _two_lights_scene(records, 512, kind)
     _save(path)
 
 
-def render(record: Record, size: int) -> NDArray[np.float32]:
+def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]:
     """The radiance (size, size, 3) that Cycles gives a record's material under the two lights."""
     from lobefit_addon.scene import render_pixels
 
-    scene = _two_lights_scene([record], "live", size)
+    scene = _two_lights_scene([record], size, kind)
     with _quiet():
         pixels: NDArray[np.float32] = render_pixels(scene)
     return pixels
 
 
-def _two_lights_scene(records: list[Record], kind: str, size: int) -> Any:
+def _two_lights_scene(records: list[Record], size: int, kind: str, **options: Any) -> Any:
     """An otherwise empty Blender with the materials; the scene shows the first, `size` pixels."""
     import bpy
     from lobefit_addon import build_material
@@ -58,7 +63,7 @@ def _two_lights_scene(records: list[Record], kind: str, size: int) -> Any:
 
     with _quiet():
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        materials = [build_material(record, kind=kind, name=record.name) for record in records]
+        materials = [build_material(record, kind, record.name, **options) for record in records]
         for material in materials:
             material.use_fake_user = True
         return two_lights_scene(materials[0], size)

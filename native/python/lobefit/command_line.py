@@ -8,7 +8,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from lobefit import _native, blender, picture, preview, report
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
-from lobefit.fitting import read
+from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import MEASUREMENT_SUFFIXES, RECORD_SUFFIX, Progress, record_of, spread
 from lobefit.origin import origin_of, write_samples
 from lobefit.record import MODELS, VISUAL_NORM, Record
@@ -95,7 +95,15 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="lobefit", description="Measured materials as Cycles node groups.")
     parser.add_argument("--version", action="version", version=f"lobefit {_native.version}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for add in (_add_sample, _add_info, _add_fit, _add_preview, _add_material, _add_report):
+    for add in (
+        _add_sample,
+        _add_info,
+        _add_fit,
+        _add_closures,
+        _add_preview,
+        _add_material,
+        _add_report,
+    ):
         add(commands)
     return parser
 
@@ -133,6 +141,38 @@ def _add_fit(commands: Any) -> None:
         "-o", dest="output", required=True, help="RECORD.json, or a folder for several files"
     )
     _add_json(command)
+
+
+def _add_closures(commands: Any) -> None:
+    command = _add(commands, _closures, "find the few Cycles closures that come nearest")
+    command.add_argument("files", metavar="FILE|RECORD.json", nargs="+", help="or folders")
+    command.add_argument("--target", choices=TARGETS, default="measured", help=_DEFAULT)
+    _add_closure_options(command)
+    _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
+    command.add_argument(
+        "-o", dest="output", required=True, help="RECORD.json, or a folder for several files"
+    )
+    _add_json(command)
+
+
+def _add_closure_options(command: argparse.ArgumentParser) -> None:
+    group = command.add_argument_group("closures")
+    group.add_argument(
+        "--closures",
+        type=_within(int, 0, MOST_CLOSURES, "a number"),
+        default=2,
+        metavar="N",
+        help="specular closures besides the diffuse one; " + _DEFAULT,
+    )
+    group.add_argument(
+        "--tolerance",
+        type=_within(float, 0, 1, "a part of the light"),
+        metavar="E",
+        help="take as few as keep the error of spheres to this",
+    )
+    group.add_argument(
+        "--cap-albedo", action="store_true", help="keep the albedo at 1 where a measurement is over"
+    )
 
 
 def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) -> None:
@@ -181,7 +221,8 @@ def _add_preview(commands: Any) -> None:
 def _add_material(commands: Any) -> None:
     command = _add(commands, _material, "make a Blender file with the material (needs bpy)")
     command.add_argument("file", metavar="FILE|RECORD.json")
-    command.add_argument("--kind", choices=blender.KINDS, default="live", help=_DEFAULT)
+    command.add_argument("--kind", choices=blender.KINDS, default="measured", help=_DEFAULT)
+    _add_closure_options(command)
     _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
     command.add_argument("-o", dest="output", required=True, metavar="OUT.blend")
 
@@ -253,32 +294,60 @@ def _bin_warnings(bins: dict[str, int]) -> list[str]:
 
 
 def _fit(options: argparse.Namespace) -> int:
+    return _write_records(options, MEASUREMENT_SUFFIXES, [], _print_fit)
+
+
+def _closures(options: argparse.Namespace) -> int:
+    request = Closures(options.target, options.closures, options.tolerance, options.cap_albedo)
+    suffixes = (*MEASUREMENT_SUFFIXES, RECORD_SUFFIX)
+    return _write_records(options, suffixes, [request], _print_closures)
+
+
+def _write_records(
+    options: argparse.Namespace,
+    suffixes: tuple[str, ...],
+    closures: list[Closures],
+    tell: Callable[[Record, Path], None],
+) -> int:
+    """Writes the record of every file of a command line, and tells of it."""
     output = Path(options.output)
     one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
-    paths = spread(options.files, MEASUREMENT_SUFFIXES)
+    paths = spread(options.files, suffixes)
     if not one:
         make_folder(output)
 
-    def fit_one(path: Path) -> None:
+    def write_one(path: Path) -> None:
         place = output if one else output / f"{path.stem}{RECORD_SUFFIX}"
         place_to_write(place)
-        record = _record(path, options)
+        record = _record(path, options, closures)
         record.save(place)
-        _print_fit(record, place, options.json)
+        if options.json:
+            print(json.dumps({"record": str(place)} | json.loads(record.to_json())))
+        else:
+            tell(record, place)
 
-    return for_each(paths, fit_one)
+    return for_each(paths, write_one)
 
 
-def _record(path: Path, options: argparse.Namespace) -> Record:
+def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures] = ()) -> Record:
     names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
+    fitted = {name: getattr(options, name) for name in names}
     with progress_bar(path.name) as progress:
-        return record_of(path, progress, **{name: getattr(options, name) for name in names})
+        return record_of(path, progress, closures=closures, **fitted)
 
 
-def _print_fit(record: Record, place: Path, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps({"record": str(place)} | json.loads(record.to_json())))
-        return
+def _print_closures(record: Record, place: Path) -> None:
+    print(f"{place}: {record.name}")
+    for entry in record.closures:
+        names = ", ".join(lobe["distribution"] for lobe in entry["specular"]) or "diffuse alone"
+        print(
+            f"   {entry['target']}, {entry['count']} specular ({names}): sphere error "
+            f"{entry['error']:.4f}, {entry['seconds']:.2f} s"
+        )
+    print(f"   principled: sphere error {record.principled['error']:.4f}")
+
+
+def _print_fit(record: Record, place: Path) -> None:
     print(f"{place}: {record.name}")
     for model, fit in record.fits.items():
         error = fit.error[record.leading_figure]["pooled"]
@@ -309,7 +378,11 @@ def _preview(options: argparse.Namespace) -> int:
 def _material(options: argparse.Namespace) -> int:
     blender.need_blender()
     place_to_write(options.output)
-    blender.write_blend(options.output, _record(Path(options.file), options), options.kind)
+    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    requests = closures_for(options.kind, options.closures, tolerance, options.cap_albedo)
+    record = _record(Path(options.file), options, requests)
+    count = options.closures if options.kind in TARGETS else None
+    blender.write_blend(options.output, record, options.kind, count=count, tolerance=tolerance)
     return DONE
 
 

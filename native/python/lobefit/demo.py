@@ -16,11 +16,12 @@ from lobefit import blender, picture, preview, report
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder
 from lobefit.command_line import DONE, INTERRUPTED, SOME_FAILED, WRONG, progress_bar
-from lobefit.fitting import read
+from lobefit.fitting import Closures, read
 from lobefit.inputs import MEASUREMENT_SUFFIXES, record_of, spread
 from lobefit.origin import write_samples
 from lobefit.record import VISUAL_NORM, Record, figure_of
 
+KIND = "measured"
 SAMPLES = ["nickel", "two-layer-silver", "violet-rubber", "red-fabric2"]
 
 
@@ -38,7 +39,7 @@ class _Demo:
     def add(self, path: Path) -> None:
         """One material, from its file to its picture."""
         with progress_bar(path.name) as progress:
-            record = record_of(path, progress, model="all", norm=VISUAL_NORM)
+            record = record_of(path, progress, model="all", norm=VISUAL_NORM, closures=[Closures()])
         record.save(make_folder(self.folder / "records") / f"{path.stem}.json")
         self.records.append(record)
         if self.has_blender:
@@ -49,9 +50,9 @@ class _Demo:
 
     def build(self, record: Record, name: str) -> None:
         """The Blender file of a record, and the picture that Cycles makes of it."""
-        blender.write_blend(make_folder(self.folder / "blend") / f"{name}.blend", record)
+        blender.write_blend(make_folder(self.folder / "blend") / f"{name}.blend", record, KIND)
         start = time.perf_counter()
-        pixels = blender.render(record, preview.SPHERE * preview.FINER)
+        pixels = blender.render(record, preview.SPHERE * preview.FINER, KIND)
         self.renderings[record.name] = report.Rendering(pixels, time.perf_counter() - start)
         shown = picture.encode(picture.expose(pixels, picture.white_point(pixels)))
         picture.write_png(make_folder(self.folder / "pictures") / f"{name}.png", shown)
@@ -62,7 +63,7 @@ class _Demo:
         report.write(self.folder, self.records, self.renderings, self.failures)
         built = [record for record in self.records if record.name in self.renderings]
         if built:
-            blender.write_library(self.folder / "materials.blend", built)
+            blender.write_library(self.folder / "materials.blend", built, KIND)
 
     def attempt(self, what: str, work: Callable[[], None]) -> bool:
         """Does the work and says whether it succeeded; a failure is named and remembered."""

@@ -17,6 +17,8 @@ Source = str | os.PathLike[str] | Measurement
 
 TARGETS = ("measured", "lobe")
 MOST_CLOSURES = 3
+# Up to which part of the light that is off the kind `auto` takes a material, if not told.
+TOLERANCE = 0.05
 
 _POLL = 0.05  # seconds between two looks at a job that is waited for
 _FIT_KEYS = tuple(Fit.__dataclass_fields__)
@@ -51,6 +53,26 @@ class Closures:
             raise InputError(f"target: expected measured or lobe, found {self.target!r}.")
         if not 0 <= self.count <= MOST_CLOSURES:
             raise InputError(f"closures: expected 0 to {MOST_CLOSURES}, found {self.count}.")
+
+    def is_in(self, record: Record) -> bool:
+        """Whether the record already holds what is asked for.
+
+        Never with a tolerance: what the record holds need not be the fewest.
+        """
+        asked = (self.target, self.count, self.cap_albedo)
+        return self.tolerance is None and any(
+            (entry["target"], entry["count"], entry["cap_albedo"]) == asked
+            for entry in record.closures
+        )
+
+
+def closures_for(
+    kind: str, count: int = 2, tolerance: float = TOLERANCE, cap_albedo: bool = False
+) -> list[Closures]:
+    """The closures that a material of this kind shows, to be asked of a fit; see build_material."""
+    if kind == "auto":
+        return [Closures("measured", tolerance=tolerance, cap_albedo=cap_albedo)]
+    return [Closures(kind, count, cap_albedo=cap_albedo)] if kind in TARGETS else []
 
 
 class Job:
@@ -204,7 +226,7 @@ def start_fit(source: Source | Record, **options: Any) -> Job:
 
 
 def fit(
-    source: Source, *, progress: Callable[[float, str], None] | None = None, **options: Any
+    source: Source | Record, *, progress: Callable[[float, str], None] | None = None, **options: Any
 ) -> Record:
     """The record of a fit of a file or a measurement, waited for; options are those of `Job`.
 

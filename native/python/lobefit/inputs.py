@@ -1,13 +1,13 @@
 """What stands on a command line for materials: measurements, records, and folders of either."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from lobefit._native import InputError
 from lobefit.atomic import reason
-from lobefit.fitting import fit
+from lobefit.fitting import Closures, fit
 from lobefit.record import Record
 
 MEASUREMENT_SUFFIXES = (".binary",)
@@ -36,8 +36,21 @@ def spread(names: Iterable[str], suffixes: Iterable[str]) -> list[Path]:
     return paths
 
 
-def record_of(path: Path, progress: Progress | None = None, **options: Any) -> Record:
-    """The record in a file *.json; of any other file the fit with these options."""
-    if path.suffix.lower() == RECORD_SUFFIX:
-        return Record.load(path)
-    return fit(path, progress=progress, **options)
+def record_of(
+    path: Path,
+    progress: Progress | None = None,
+    closures: Sequence[Closures] = (),
+    **options: Any,
+) -> Record:
+    """The record in a file *.json; of any other file the fit with these options.
+
+    Closures that the record does not hold yet are added.
+    """
+    if path.suffix.lower() != RECORD_SUFFIX:
+        return fit(path, progress=progress, closures=closures, **options)
+    record = Record.load(path)
+    missing = [request for request in closures if not request.is_in(record)]
+    if not missing:
+        return record
+    threads = options.get("threads", 0)
+    return fit(record, progress=progress, closures=missing, threads=threads)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,21 +60,25 @@ def row(
     measurement: Measurement | None,
     size: int = SPHERE,
     rendered: NDArray[np.float32] | None = None,
+    shown: tuple[str, dict[str, Any]] | None = None,
 ) -> Row:
     """The spheres of a record, all at the exposure that suits the first of them.
 
-    `rendered` is the radiance that Cycles itself gave, FINER * size pixels wide.
+    `shown` is what Cycles is to show, as `_native.preview` takes it: if None, the measured closures
+    in the record that are nearest, or else the live group. `rendered` is the radiance that Cycles
+    itself gave, FINER * size pixels wide.
     """
     linear = {"measured": _native.preview(measurement, size * FINER)} if measurement else {}
     for model, fit in record.fits.items():
         linear[model] = _native.preview(fit.parameters, size * FINER)
-    linear["cycles"] = _native.preview(("live", record.parameters), size * FINER)
+    shown = shown or _nearest(record)
+    linear["cycles"] = _native.preview(shown, size * FINER)
     figure = record.leading_figure
     captions = {
         model: f"{FIGURES[figure]} {fit.error[figure]['pooled']:.3f}"
         for model, fit in record.fits.items()
     }
-    captions["cycles"] = f"from {TITLES[record.model]}"
+    captions["cycles"] = _caption(shown, record)
     if rendered is not None:
         linear["rendered"] = rendered
         captions["rendered"] = f"{_apart(rendered, linear['cycles']):.4f} from the former"
@@ -122,6 +127,21 @@ def sheet(rows: list[Row], size: int = SPHERE) -> Image:
 
 def _sphere(linear: NDArray[np.float32], white: float) -> Image:
     return picture.encode(picture.shrink(picture.expose(linear, white), FINER))
+
+
+def _nearest(record: Record) -> tuple[str, dict[str, Any]]:
+    measured = [entry for entry in record.closures if entry["target"] == "measured"]
+    if measured:
+        return "closures", min(measured, key=lambda entry: entry["error"])
+    return "live", record.parameters
+
+
+def _caption(shown: tuple[str, dict[str, Any]], record: Record) -> str:
+    kind, what = shown
+    if kind == "closures":
+        many = len(what["specular"])
+        return f"{what['target']}, {many} specular closure{'' if many == 1 else 's'}"
+    return f"from {TITLES[record.model]}" if kind == "live" else "best Principled BSDF"
 
 
 def _apart(image: NDArray[np.float32], reference: NDArray[np.float32]) -> float:

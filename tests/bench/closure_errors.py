@@ -1,0 +1,148 @@
+"""How near each kind of material comes: ./dev bench closure_errors FILE.. --judge JUDGE.py
+
+For each measured file, the sphere error of its materials rendered by Cycles (JUDGE.py FILE.blend
+MATERIAL --merl FILE --json OUT): `measured` with 1, 2 and 3 specular closures, the best-fit
+Principled BSDF, and `lobe` with 2 closures, the last against the fitted lobe itself. With --lobes
+in place of files it is the published grid of lobes (exponent, interpolation, with and without
+Fresnel). --offset shifts the judge's phases; each further --python (an interpreter with another
+bpy) renders the same files, and the largest difference of its figures is printed.
+"""
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import lobefit
+from lobefit_addon import build_material
+
+EXPONENTS = (1.0, 5.0, 10.0, 30.0, 100.0, 500.0, 5000.0)
+INTERPOLATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+IORS = (None, 1.5)
+LOBE_KEYS = ("diffuse", "specular", "exponent", "interpolation", "ior")
+
+
+@dataclass
+class Case:
+    """A material in a file, what it is to be compared with, and what the engine says of it."""
+
+    name: str
+    reference: list[str]
+    predicted: float
+    seconds: float = 0.0
+
+
+def measured_cases(path: Path, counts: list[int]) -> list[Case]:
+    """Builds the materials of a measured file."""
+    requests = [lobefit.Closures(count=count) for count in counts]
+    requests.append(lobefit.Closures("lobe", 2))
+    record = lobefit.fit(path, norm="cosine-l1", closures=requests)
+    table = ["--merl", str(path)]
+    cases = []
+    for entry in record.closures:
+        kind, count = entry["target"], entry["count"]
+        name = f"{path.stem} {kind} {count}"
+        build_material(record, kind, name, count=count).use_fake_user = True
+        reference = table if kind == "measured" else lobe_reference(record.parameters)
+        cases.append(Case(name, reference, entry["error"], entry["seconds"]))
+    name = f"{path.stem} principled"
+    build_material(record, "principled", name).use_fake_user = True
+    return [*cases, Case(name, table, record.principled["error"])]
+
+
+def lobe_reference(parameters: dict[str, Any]) -> list[str]:
+    return ["--lobe", json.dumps({key: parameters[key] for key in LOBE_KEYS})]
+
+
+def lobe_case(exponent: float, interpolation: float, ior: float | None) -> Case:
+    """Builds the material of one lobe without a diffuse part."""
+    values = ([0.0] * 3, [1.0] * 3, exponent, interpolation, ior)
+    parameters = dict(zip(LOBE_KEYS, values, strict=True))
+    # A record needs a fit; of it only the Principled BSDF for other renderers is used here.
+    record = blank_record(parameters)
+    record = lobefit.closures(record, target="lobe", count=2)
+    name = f"{exponent:g} {interpolation:g} {ior}"
+    build_material(record, "lobe", name, count=2).use_fake_user = True
+    entry = record.closures[0]
+    return Case(name, lobe_reference(parameters), entry["error"], entry["seconds"])
+
+
+def blank_record(parameters: dict[str, Any]) -> lobefit.Record:
+    figure = {"pooled": 0.0, "rgb": [0.0] * 3}
+    black = dict(base_color=[0.0] * 3, metallic=0.0, roughness=0.5, ior=1.0, error=0.0)
+    return lobefit.Record(
+        model="interpolated",
+        parameters={"model": "interpolated", **parameters},
+        error=dict.fromkeys(("l1", "relative_l1", "relative_l1_80", "relative_l1_cosine"), figure),
+        stages=[],
+        seconds=dict.fromkeys(("read", "start", "fit", "total"), 0.0),
+        converged=True,
+        certainty={"starts": 0, "agree": 0, "spread": 0.0},
+        albedo={"view_angle": [], "measured": [], "model": []},
+        warnings=[],
+        principled=black | {"specular_tint": [1.0] * 3},
+        source={"path": None, "sha256": None, "format": "MERL", "bins": {}},
+        schedule="polish",
+        norm="cosine-l1",
+        channels="shared",
+        max_angle=90.0,
+    )
+
+
+def judge(python: str, script: Path, blend: Path, case: Case, offset: float) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out.json"
+        command = [python, script, blend, case.name, *case.reference, "--json", out]
+        command += ["--offset", str(offset)]
+        subprocess.run(list(map(str, command)), check=True, capture_output=True)
+        return json.loads(out.read_text())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("files", nargs="*", type=Path)
+    parser.add_argument("--judge", type=Path, required=True)
+    parser.add_argument("--lobes", action="store_true")
+    parser.add_argument("--counts", nargs="*", type=int, default=[1, 2, 3])
+    parser.add_argument("--offset", type=float, default=0.0)
+    parser.add_argument("--python", nargs="*", default=[])
+    options = parser.parse_args()
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    cases: list[Case] = []
+    if options.lobes:
+        cases += [lobe_case(s, a, e) for s in EXPONENTS for e in IORS for a in INTERPOLATIONS]
+    for path in options.files:
+        cases += measured_cases(path, options.counts)
+    with tempfile.TemporaryDirectory() as folder:
+        blend = Path(folder) / "materials.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+        print("| material | sphere error | grazing | worst (phase) | r, g, b | predicted | s |")
+        print("|---" * 7 + "|")
+        found = {}
+        for case in cases:
+            told = judge(sys.executable, options.judge, blend, case, options.offset)
+            found[case.name] = told["sphere_error"]
+            worst, channels = told["worst"], ", ".join(f"{e:.3f}" for e in told["channels"])
+            print(
+                f"| {case.name} | {told['sphere_error']:.4f} | {told['grazing']:.3f} | "
+                f"{worst['error']:.3f} ({worst['phase']:g}) | {channels} | {case.predicted:.4f} | "
+                f"{case.seconds:.2f} |",
+                flush=True,
+            )
+        for python in options.python:
+            apart = [
+                abs(judge(python, options.judge, blend, case, options.offset)["sphere_error"] - now)
+                for case, now in zip(cases, found.values(), strict=True)
+            ]
+            print(f"{python}: largest difference {max(apart):.1e}", flush=True)
+    print(f"median {statistics.median(found.values()):.4f}, worst {max(found.values()):.4f}")
+
+
+if __name__ == "__main__":
+    main()
