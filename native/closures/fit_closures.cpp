@@ -83,7 +83,9 @@ AtView at_view(const Eigen::VectorXd& x, double cosine) {
 // How far a closure may be bent at a view angle: its mirror direction stays above the horizon,
 // else Cycles bends it back (and the viewer above the closure's own horizon).
 double least_tilt(double cosine, double sine) { return -0.9 * cosine / (1 + sine); }
-double greatest_tilt(double cosine, double sine) { return 0.9 * (1 + sine) / std::max(cosine, 0.02); }
+double greatest_tilt(double cosine, double sine) {
+  return 0.9 * (1 + sine) / std::max(cosine, 0.02);
+}
 
 // A shape within what Cycles can show, and which of its numbers were clipped.
 struct ClippedShape {
@@ -247,8 +249,7 @@ void add_penalty(const Layout& layout, const Eigen::VectorXd& x, Equations& equa
     const double stiffness = stiffness_of(layout, curve);
     for (int i = curve * n; i + 2 < (curve + 1) * n; ++i) {
       equations.matrix.block<3, 3>(i, i) += stiffness * difference * difference.transpose();
-      equations.gradient.segment<3>(i) +=
-          stiffness * difference.dot(x.segment<3>(i)) * difference;
+      equations.gradient.segment<3>(i) += stiffness * difference.dot(x.segment<3>(i)) * difference;
     }
   }
 }
@@ -324,8 +325,7 @@ Eigen::VectorXd step_from(const Eigen::VectorXd& x, const Bounds& bounds,
   matrix = scale.asDiagonal() * matrix * scale.asDiagonal();
   matrix.diagonal().array() += damping;
   Eigen::VectorXd tried = x;
-  tried(free) -= scale.cwiseProduct(
-      matrix.llt().solve(scale.cwiseProduct(gradient)).eval());
+  tried(free) -= scale.cwiseProduct(matrix.llt().solve(scale.cwiseProduct(gradient)).eval());
   return tried.cwiseMax(bounds.least).cwiseMin(bounds.greatest);
 }
 
@@ -398,9 +398,9 @@ std::vector<Candidate> starts(const Target& target, int specular) {
   return all;
 }
 
-// How far curve nodes may be off the curves that were fitted, as a part of what they stand for:
-// fewer points than this asks for would show in the error.
-constexpr double curve_tolerance = 2e-3;
+// How far curve nodes may be off the curves that were fitted, as a part of what they stand for: so
+// little that the error does not show it.
+double curve_tolerance(double error) { return std::clamp(0.04 * error, 1e-4, 2e-3); }
 
 double least_over_view(const std::function<double(double)>& of_cosine) {
   double least = of_cosine(1);
@@ -413,7 +413,7 @@ struct WeightFactors {
   std::array<ViewCurve, 3> by_channel = {ViewCurve(1), ViewCurve(1), ViewCurve(1)};
 };
 
-ClosureSet to_closures(const Problem& problem, const Eigen::VectorXd& x,
+ClosureSet to_closures(const Problem& problem, const Eigen::VectorXd& x, double tolerance,
                        const WeightFactors& factors) {
   const Layout& layout = problem.layout;
   const auto weight_of = [&](int closure, int channel) {
@@ -424,14 +424,14 @@ ClosureSet to_closures(const Problem& problem, const Eigen::VectorXd& x,
         [&](double cosine) {
           return factor(cosine) * ViewSplines::evaluate(x.data() + curve * n, cosine);
         },
-        curve_tolerance * size);
+        tolerance * size);
   };
   ClosureSet result;
   for (int c = 0; c < 3; ++c) {
     result.diffuse[static_cast<std::size_t>(c)] = weight_of(layout.specular, c);
   }
   for (int k = 0; k < layout.specular; ++k) {
-    const auto sockets = [&](double ClosureSockets::* socket) {
+    const auto sockets = [&](double ClosureSockets::*socket) {
       return [&, k, socket](double cosine) {
         const double inside = std::clamp(cosine, 1e-3, 1 - 1e-6);
         const AtView at = at_view(x, inside);
@@ -442,12 +442,11 @@ ClosureSet to_closures(const Problem& problem, const Eigen::VectorXd& x,
     closure.distribution = problem.distributions[static_cast<std::size_t>(k)];
     // A highlight moved by a part of its width changes as much as one that is wider by that part.
     const double least_roughness = least_over_view(sockets(&ClosureSockets::roughness));
-    closure.roughness = ViewCurve::following(sockets(&ClosureSockets::roughness),
-                                             curve_tolerance * least_roughness);
-    closure.anisotropy =
-        ViewCurve::following(sockets(&ClosureSockets::anisotropy), 4 * curve_tolerance);
+    closure.roughness =
+        ViewCurve::following(sockets(&ClosureSockets::roughness), tolerance * least_roughness);
+    closure.anisotropy = ViewCurve::following(sockets(&ClosureSockets::anisotropy), 4 * tolerance);
     closure.bend = ViewCurve::following(sockets(&ClosureSockets::bend),
-                                        4 * curve_tolerance * square(least_roughness));
+                                        4 * tolerance * square(least_roughness));
     for (int c = 0; c < 3; ++c) closure.weight[static_cast<std::size_t>(c)] = weight_of(k, c);
     result.specular.push_back(std::move(closure));
   }
@@ -499,7 +498,7 @@ double error_of_closures(const Target& target, const ClosureSet& closures) {
 // Leaves out what the error does not miss: each closure in turn, and the colour of a weight that is
 // all but grey.
 void leave_out(const Target& target, FittedClosures& fitted) {
-  constexpr double missed = 3e-4;
+  const double missed = 0.005 * fitted.error;
   const auto adopt = [&](const ClosureSet& tried) {
     const double error = error_of_closures(target, tried);
     if (!(error < fitted.error + missed)) return false;
@@ -538,31 +537,32 @@ FittedClosures fit_closures(const Target& target, const ClosureFitOptions& optio
     parallel_for(static_cast<int>(found.size()), threads, [&](int i) {
       Candidate& candidate = found[static_cast<std::size_t>(i)];
       const Effort effort{every_view, 1};
-      candidate.x =
-          descend(candidate.problem, effort, candidate.x, smoothing, iterations, monitor);
-      candidate.error = smooth_error(candidate.problem, effort, candidate.x, 0.01);
+      candidate.x = descend(candidate.problem, effort, candidate.x, smoothing, iterations, monitor);
+      candidate.error = smooth_error(candidate.problem, effort, candidate.x, 1e-3);
     });
-    std::stable_sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
-      return a.error < b.error;
-    });
+    std::stable_sort(found.begin(), found.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
+  };
+  const auto keep = [&](std::size_t most) {
+    found.resize(std::min(found.size(), most), found.front());
   };
   monitor.report("Trying closures", 0);
-  follow(0.3, 4, 4);
-  found.resize(std::min<std::size_t>(found.size(), 6), found.front());
-  monitor.report("Trying closures", 0.3);
-  follow(0.1, 8, 2);
-  found.resize(std::min<std::size_t>(found.size(), 2), found.front());
-  monitor.report("Fitting closures", 0.5);
+  follow(0.3, 5, 3);
+  keep(12);
+  monitor.report("Trying closures", 0.2);
+  follow(0.1, 10, 2);
+  keep(5);
+  monitor.report("Fitting closures", 0.4);
   follow(0.03, 20, 1);
-  monitor.report("Fitting closures", 0.75);
-  Candidate& best = found.front();
-  for (const double smoothing : {0.03, 0.01}) {
-    best.x = descend(best.problem, {1, threads}, best.x, smoothing, 20, monitor);
-  }
+  keep(2);
+  monitor.report("Fitting closures", 0.7);
+  for (const double smoothing : {0.01, 0.002}) follow(smoothing, 30, 1);
+  const Candidate& best = found.front();
+  const double tolerance = curve_tolerance(best.error);
   WeightFactors factors;
-  FittedClosures result{to_closures(best.problem, best.x, factors), 0, {}};
+  FittedClosures result{to_closures(best.problem, best.x, tolerance, factors), 0, {}};
   factors = energy_factors(look_at(target, result.closures), options.cap_albedo);
-  result.closures = to_closures(best.problem, best.x, factors);
+  result.closures = to_closures(best.problem, best.x, tolerance, factors);
   result.error = error_of_closures(target, result.closures);
   leave_out(target, result);
   result.by_view = look_at(target, result.closures);

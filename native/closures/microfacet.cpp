@@ -92,13 +92,13 @@ ShapeValue Microfacet::compute(const Vector3& wi, const Vector3& half) const {
   } else {
     const double inverse = 1 / (a * a);
     const double exponent = (x + y * stretch2_) * inverse;
-    result.value = scale_ * hidden * std::exp(-exponent) * (inverse * inverse) * stretch2_ *
-                   stretch2_;
+    result.value =
+        scale_ * hidden * std::exp(-exponent) * (inverse * inverse) * stretch2_ * stretch2_;
     if constexpr (!derivatives) return result;
     by_x = 2 * x * inverse;
     by_y = 2 * y * stretch2_ * inverse;
-    by_tilt = 2 * (b * half.z() * inverse_x2_ - y * tilt_) * inverse +
-              2 * exponent * half.x() / a - 4 * half.x() / a + 4 * tilt_ / stretch2_;
+    by_tilt = 2 * (b * half.z() * inverse_x2_ - y * tilt_) * inverse + 2 * exponent * half.x() / a -
+              4 * half.x() / a + 4 * tilt_ / stretch2_;
   }
   const auto masked = [&](double slope_i_by, double slope_o_by) {
     return hidden * (masking_i.by_slope * slope_i_by + masking_o_.by_slope * slope_o_by);

@@ -17,9 +17,9 @@ constexpr double least_picture_cosine = 0.1;
 // What is darker is black and what is brighter could make sums infinite; no reflectance comes near.
 constexpr double darkest = 1e-12, brightest = 1e30;
 
-// The sum of an amount over all samples at about one angle p between light and viewer, as a function
-// of p: hats of 5 degrees, constant beyond the first and the last, where pictures hold next to
-// nothing.
+// The sum of an amount over all samples at about one angle p between light and viewer, as a
+// function of p: hats of 5 degrees, constant beyond the first and the last, where pictures hold
+// next to nothing.
 class SumByPhase {
  public:
   static constexpr std::size_t count = 33;

@@ -132,11 +132,10 @@ py::dict to_dict(const FittedClosures& fitted) {
   using namespace py::literals;
   py::list specular, angles, target, closures, errors;
   for (const SpecularClosure& closure : fitted.closures.specular) {
-    specular.append(py::dict("distribution"_a = std::string(name_of(closure.distribution)),
-                             "roughness"_a = to_list(closure.roughness),
-                             "anisotropy"_a = to_list(closure.anisotropy),
-                             "bend"_a = to_list(closure.bend),
-                             "weight"_a = to_list(closure.weight)));
+    specular.append(py::dict(
+        "distribution"_a = std::string(name_of(closure.distribution)),
+        "roughness"_a = to_list(closure.roughness), "anisotropy"_a = to_list(closure.anisotropy),
+        "bend"_a = to_list(closure.bend), "weight"_a = to_list(closure.weight)));
   }
   for (const SeenAtAngle& seen : fitted.by_view) {
     angles.append(degrees(std::acos(seen.cosine)));
@@ -144,11 +143,11 @@ py::dict to_dict(const FittedClosures& fitted) {
     closures.append(to_list(seen.closures_albedo));
     errors.append(seen.relative_error);
   }
-  return py::dict("error"_a = fitted.error, "diffuse"_a = to_list(fitted.closures.diffuse),
-                  "specular"_a = specular,
-                  "by_view"_a = py::dict("view_angle"_a = angles, "target_albedo"_a = target,
-                                         "closures_albedo"_a = closures,
-                                         "relative_error"_a = errors));
+  return py::dict(
+      "error"_a = fitted.error, "diffuse"_a = to_list(fitted.closures.diffuse),
+      "specular"_a = specular,
+      "by_view"_a = py::dict("view_angle"_a = angles, "target_albedo"_a = target,
+                             "closures_albedo"_a = closures, "relative_error"_a = errors));
 }
 
 ClosureSet closures_from(const py::dict& dict) {
@@ -258,8 +257,7 @@ Reflectance principled_reflectance(const Principled& principled) {
 }
 
 Reflectance closures_reflectance(const ClosureSet& closures) {
-  return
-      [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
+  return [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
 }
 
 Reflectance measured_reflectance(SharedMeasurement measurement) {
@@ -359,8 +357,8 @@ std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string
 
 // The closures of a Measurement or of a dict of parameters: `count` specular ones, or with a
 // negative count as few as stay within the tolerance.
-std::unique_ptr<ClosureJob> start_closure_job(const py::object& source, int count,
-                                              double tolerance, bool cap_albedo, int threads) {
+std::unique_ptr<ClosureJob> start_closure_job(const py::object& source, int count, double tolerance,
+                                              bool cap_albedo, int threads) {
   if (count > most_specular_closures) {
     throw InputError("closures: expected at most " + std::to_string(most_specular_closures) +
                      ", found " + std::to_string(count) + ".");
@@ -499,11 +497,10 @@ void bind_functions(py::module_& module) {
       },
       py::arg("closures"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of an entry of a record's closures as Cycles renders it, (N, 3).");
-  module.def(
-      "preview", &preview, py::arg("source"), py::arg("size"),
-      "The sphere under two lights, (size, size, 3) linear, row 0 at the top. source: a "
-      "Measurement, a dict of parameters, ('live', parameters), ('principled', its dict) or "
-      "('closures', an entry of a record's closures).");
+  module.def("preview", &preview, py::arg("source"), py::arg("size"),
+             "The sphere under two lights, (size, size, 3) linear, row 0 at the top. source: a "
+             "Measurement, a dict of parameters, ('live', parameters), ('principled', its dict) or "
+             "('closures', an entry of a record's closures).");
 }
 
 }  // namespace
