@@ -144,12 +144,14 @@ struct ViewEquations {
   Eigen::VectorXd gradient;
 };
 
+// The number of closures is known when this is compiled, so that its inner loops unroll.
+template <int specular>
 ViewEquations linearise_view(const Problem& problem, const TargetView& view,
                              const Eigen::VectorXd& x, double smoothing) {
+  constexpr int own = shape_curves * specular + specular + 1;
   const Layout& layout = problem.layout;
   const AtView at = at_view(x, view.wo.z());
   const double sine = at.sine;
-  const int specular = layout.specular, own = shape_curves * specular + layout.closures();
   std::vector<ClippedShape> shapes;
   std::vector<Microfacet> closures;
   for (int k = 0; k < specular; ++k) {
@@ -159,16 +161,14 @@ ViewEquations linearise_view(const Problem& problem, const TargetView& view,
   }
   // One channel depends on the shapes and on its own weights: the equations of the three channels
   // are kept apart until all lights are in.
-  constexpr int most = 4 * shape_curves + 4;
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most, most>;
-  using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most, 1>;
-  std::array<Small, 3> matrices;
+  using Matrix = Eigen::Matrix<double, own, own>;
+  using Column = Eigen::Matrix<double, own, 1>;
+  std::array<Matrix, 3> matrices;
   std::array<Column, 3> gradients;
-  for (int c = 0; c < 3; ++c) {
-    matrices[static_cast<std::size_t>(c)] = Small::Zero(own, own);
-    gradients[static_cast<std::size_t>(c)] = Column::Zero(own);
-  }
-  Column row(own), by_shape(shape_curves * specular);
+  matrices.fill(Matrix::Zero());
+  gradients.fill(Column::Zero());
+  Column row;
+  std::array<double, shape_curves * specular + 1> by_shape{};
   for (const TargetLight& light : view.lights) {
     for (int k = 0; k < specular; ++k) {
       const ClippedShape& shape = shapes[static_cast<std::size_t>(k)];
@@ -176,20 +176,20 @@ ViewEquations linearise_view(const Problem& problem, const TargetView& view,
           closures[static_cast<std::size_t>(k)].evaluate_with_derivatives(light.wi, light.half);
       const double by_x = shape.x_free ? value.by_log_alpha_x : 0;
       const double by_y = shape.y_free ? value.by_log_alpha_y : 0;
-      by_shape[shape_curves * k + mean] = value.value * (by_x + by_y);
-      by_shape[shape_curves * k + spread] = value.value * (by_y - by_x) * sine * sine;
-      by_shape[shape_curves * k + bend] = shape.tilt_free ? value.value * value.by_tilt * sine : 0;
+      double* const by = by_shape.data() + shape_curves * k;
+      by[mean] = value.value * (by_x + by_y);
+      by[spread] = value.value * (by_y - by_x) * sine * sine;
+      by[bend] = shape.tilt_free ? value.value * value.by_tilt * sine : 0;
       row[shape_curves * specular + k] = value.value;
     }
     row[own - 1] = light.wi.z() / pi;
     for (int c = 0; c < 3; ++c) {
       double r = -light.reflected[c];
-      for (int k = 0; k < layout.closures(); ++k) {
+      for (int k = 0; k <= specular; ++k) {
         const double weight = at.curves[layout.weight(k, c)];
         r += weight * row[shape_curves * specular + k];
-        if (k < specular) {
-          row.segment<shape_curves>(shape_curves * k) =
-              weight * by_shape.segment<shape_curves>(shape_curves * k);
+        for (int i = shape_curves * k; k < specular && i < shape_curves * (k + 1); ++i) {
+          row[i] = weight * by_shape[static_cast<std::size_t>(i)];
         }
       }
       const double e = smoothing * light.typical;
@@ -216,6 +216,21 @@ ViewEquations linearise_view(const Problem& problem, const TargetView& view,
   }
   sum.matrix.triangularView<Eigen::StrictlyUpper>() = sum.matrix.transpose();
   return sum;
+}
+
+ViewEquations linearise_view(const Problem& problem, const TargetView& view,
+                             const Eigen::VectorXd& x, double smoothing) {
+  static_assert(most_specular_closures == 3);
+  switch (problem.layout.specular) {
+    case 0:
+      return linearise_view<0>(problem, view, x, smoothing);
+    case 1:
+      return linearise_view<1>(problem, view, x, smoothing);
+    case 2:
+      return linearise_view<2>(problem, view, x, smoothing);
+    default:
+      return linearise_view<3>(problem, view, x, smoothing);
+  }
 }
 
 // A little curvature costs a little error, so that curves are smooth where the target does not say:

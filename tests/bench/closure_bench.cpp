@@ -1,0 +1,77 @@
+// The search for closures: ./dev bench closure_bench FILE..
+//
+// For each measured file and 1, 2 and 3 specular closures: error, least seconds of three searches
+// on every processor beside the seconds of reading the file and of sampling it, and the number of
+// points of all curves. The last column is the bound for 2: the sum of the errors of closures that
+// are fitted to each view angle alone, without smooth curves between them. No material made of a
+// diffuse and two such closures can be much nearer than that.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+
+#include "closures/fit_closures.h"
+#include "measurement/read_measurement.h"
+
+namespace lobefit {
+namespace {
+
+template <typename Work>
+double seconds_of(Work&& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::size_t points_of(const ClosureSet& closures) {
+  std::size_t points = 0;
+  const auto add = [&](const ViewCurve& curve) { points += curve.points().size(); };
+  for (const ViewCurve& curve : closures.diffuse) add(curve);
+  for (const SpecularClosure& specular : closures.specular) {
+    add(specular.roughness);
+    add(specular.anisotropy);
+    add(specular.bend);
+    for (const ViewCurve& curve : specular.weight) add(curve);
+  }
+  return points;
+}
+
+double bound(const Target& target) {
+  double sum = 0;
+  Monitor monitor;
+  for (const TargetView& view : target) sum += fit_closures({view}, {}, monitor).error;
+  return sum;
+}
+
+void tell(const char* path) {
+  std::shared_ptr<Measurement> measurement;
+  const double read =
+      seconds_of([&] { measurement = std::make_shared<Measurement>(read_measurement(path)); });
+  Target target;
+  const double sample = seconds_of([&] {
+    target = sample_target(
+        [&](const Vector3& wi, const Vector3& wo) { return measurement->evaluate(wi, wo); });
+  });
+  std::printf("| %s | %.3f | %.3f |", path, read, sample);
+  for (int count = 1; count <= most_specular_closures; ++count) {
+    FittedClosures fitted;
+    double least = 1e9;
+    for (int round = 0; round < 3; ++round) {
+      Monitor monitor;
+      const ClosureFitOptions options{count, false, 0};
+      least = std::min(least, seconds_of([&] { fitted = fit_closures(target, options, monitor); }));
+    }
+    std::printf(" %.4f, %.2f s, %zu |", fitted.error, least, points_of(fitted.closures));
+  }
+  std::printf(" %.4f |\n", bound(target));
+  std::fflush(stdout);
+}
+
+}  // namespace
+}  // namespace lobefit
+
+int main(int count, char** paths) {
+  std::printf("| file | read s | sample s | 1: error, s, points | 2 | 3 | bound of 2 |\n");
+  std::printf("|---|---|---|---|---|---|---|\n");
+  for (int i = 1; i < count; ++i) lobefit::tell(paths[i]);
+}
