@@ -27,22 +27,31 @@ Shape to_shape(const ClosureSockets& sockets, double sine) {
           sockets.bend * sine};
 }
 
+ClosuresAtView::ClosuresAtView(const ClosureSet& closures, const Vector3& wo)
+    : diffuse_(at(closures.diffuse, wo.z()) / pi) {
+  const double cosine = wo.z();
+  for (const SpecularClosure& specular : closures.specular) {
+    const Shape shape = to_shape(
+        {specular.roughness(cosine), specular.anisotropy(cosine), specular.bend(cosine)}, wo.x());
+    specular_.emplace_back(Microfacet(specular.distribution, shape, wo),
+                           at(specular.weight, cosine));
+  }
+}
+
+Rgb ClosuresAtView::evaluate(const Vector3& wi, const Vector3& half) const {
+  Rgb result = diffuse_ * wi.z();
+  for (const auto& [closure, weight] : specular_) result += weight * closure.evaluate(wi, half);
+  return result;
+}
+
 Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo) {
   if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
-  const double cosine = wo.z(), sine = std::hypot(wo.x(), wo.y());
+  const double sine = std::hypot(wo.x(), wo.y());
   // Turned about the normal so that the viewer is in the xz plane.
   const double c = sine > 0 ? wo.x() / sine : 1, s = sine > 0 ? wo.y() / sine : 0;
   const Vector3 light(c * wi.x() + s * wi.y(), c * wi.y() - s * wi.x(), wi.z());
-  const Vector3 viewer(sine, 0, cosine);
-  const Vector3 half = (light + viewer).normalized();
-  Rgb result = at(closures.diffuse, cosine) * (wi.z() / pi);
-  for (const SpecularClosure& specular : closures.specular) {
-    const Shape shape = to_shape(
-        {specular.roughness(cosine), specular.anisotropy(cosine), specular.bend(cosine)}, sine);
-    result += at(specular.weight, cosine) *
-              Microfacet(specular.distribution, shape, viewer).evaluate(light, half);
-  }
-  return result;
+  const Vector3 viewer(sine, 0, wo.z());
+  return ClosuresAtView(closures, viewer).evaluate(light, (light + viewer).normalized());
 }
 
 }  // namespace lobefit

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <array>
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "closures/microfacet.h"
@@ -37,6 +37,20 @@ struct ClosureSockets {
 };
 ClosureSockets to_sockets(const Shape& shape, double sine);
 Shape to_shape(const ClosureSockets& sockets, double sine);
+
+// Closures seen from one angle, with all curves read.
+class ClosuresAtView {
+ public:
+  // The viewer at wo in the xz plane, x >= 0, above the horizon.
+  ClosuresAtView(const ClosureSet& closures, const Vector3& wo);
+
+  // f cos(theta_i) for a light at wi above the horizon and the unit half vector of wi and wo.
+  Rgb evaluate(const Vector3& wi, const Vector3& half) const;
+
+ private:
+  Rgb diffuse_;
+  std::vector<std::pair<Microfacet, Rgb>> specular_;  // with their weights
+};
 
 // f cos(theta_i) in 1/sr, as Cycles 4.2 and later evaluate it, for unit vectors toward the light
 // (wi) and the viewer (wo), n = +z; 0 below the horizon.

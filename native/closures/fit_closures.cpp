@@ -472,9 +472,10 @@ std::vector<SeenAtAngle> look_at(const Target& target, const ClosureSet& closure
   std::vector<SeenAtAngle> seen;
   for (const TargetView& view : target) {
     SeenAtAngle at{view.wo.z(), Rgb::Zero(), Rgb::Zero(), 0};
+    const ClosuresAtView seen_closures(closures, view.wo);
     double error = 0, light = 0;
     for (const TargetLight& to : view.lights) {
-      const Rgb reflected = evaluate_closures(closures, to.wi, view.wo);
+      const Rgb reflected = seen_closures.evaluate(to.wi, to.half);
       at.target_albedo += to.solid_angle * to.reflected;
       at.closures_albedo += to.solid_angle * reflected;
       error += to.weight * (reflected - to.reflected).abs().sum();
@@ -505,9 +506,14 @@ WeightFactors energy_factors(const std::vector<SeenAtAngle>& seen, bool cap_albe
 }
 
 double error_of_closures(const Target& target, const ClosureSet& closures) {
-  return error_of(target, [&](const Vector3& wi, const Vector3& wo) {
-    return evaluate_closures(closures, wi, wo);
-  });
+  double error = 0;
+  for (const TargetView& view : target) {
+    const ClosuresAtView at(closures, view.wo);
+    for (const TargetLight& light : view.lights) {
+      error += light.weight * (at.evaluate(light.wi, light.half) - light.reflected).abs().sum();
+    }
+  }
+  return error;
 }
 
 // Leaves out what the error does not miss: each closure in turn, and the colour of a weight that is
