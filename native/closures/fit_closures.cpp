@@ -374,11 +374,13 @@ struct Candidate {
   double error;
 };
 
-Eigen::VectorXd start_at(const Layout& layout, const std::vector<double>& alphas) {
+Eigen::VectorXd start_at(const Layout& layout, const std::vector<double>& alphas,
+                         const std::vector<double>& bends) {
   Eigen::VectorXd x = Eigen::VectorXd::Zero(layout.unknowns());
   for (int k = 0; k < layout.specular; ++k) {
     x.segment(layout.shape(k, mean) * n, n)
         .setConstant(std::log(alphas[static_cast<std::size_t>(k)]));
+    x.segment(layout.shape(k, bend) * n, n).setConstant(bends[static_cast<std::size_t>(k)]);
   }
   x.tail(layout.closures() * 3 * n).setConstant(0.1);
   return x;
@@ -387,9 +389,11 @@ Eigen::VectorXd start_at(const Layout& layout, const std::vector<double>& alphas
 std::vector<Candidate> starts(const Target& target, int specular) {
   constexpr std::array<double, 6> alphas = {0.008, 0.025, 0.07, 0.17, 0.4, 0.9};
   std::vector<Candidate> all;
-  const auto add = [&](const std::vector<double>& chosen, const Distributions& distributions) {
+  const auto add = [&](const std::vector<double>& chosen, const Distributions& distributions,
+                       std::vector<double> bends = {}) {
     const Layout layout{specular};
-    all.push_back({{&target, layout, distributions}, start_at(layout, chosen), 0});
+    bends.resize(chosen.size(), 0);
+    all.push_back({{&target, layout, distributions}, start_at(layout, chosen, bends), 0});
   };
   using enum Distribution;
   const auto count = alphas.size();
@@ -403,6 +407,12 @@ std::vector<Candidate> starts(const Target& target, int specular) {
         add({alphas[i], alphas[j]}, {ggx, ggx});
         add({alphas[i], alphas[j]}, {beckmann, ggx});
         add({alphas[i], alphas[j]}, {beckmann, beckmann});
+        // The best two for a lobe that is nearly diffuse are bent apart.
+        for (const double bent : {0.3, 0.8}) {
+          if (alphas[i] < 0.1) continue;
+          add({alphas[i], alphas[j]}, {beckmann, beckmann}, {bent, 0});
+          add({alphas[i], alphas[j]}, {beckmann, beckmann}, {0, bent});
+        }
       }
       for (std::size_t k = j + 1; specular == 3 && k < count; ++k) {
         add({alphas[i], alphas[j], alphas[k]}, {ggx, ggx, ggx});
