@@ -6,7 +6,7 @@
 namespace lobefit {
 namespace {
 
-constexpr int entries = 256;
+constexpr int steps = 256;
 
 // Marks the points needed between two that are kept, by the one that is farthest off the line.
 void keep_needed(const std::vector<ViewCurve::Point>& all, std::size_t from, std::size_t to,
@@ -15,8 +15,8 @@ void keep_needed(const std::vector<ViewCurve::Point>& all, std::size_t from, std
   std::size_t farthest = 0;
   for (std::size_t i = from + 1; i < to; ++i) {
     const double share = (all[i].cosine - all[from].cosine) / (all[to].cosine - all[from].cosine);
-    const double off = std::abs(all[from].value + share * (all[to].value - all[from].value) -
-                                all[i].value);
+    const double off =
+        std::abs(all[from].value + share * (all[to].value - all[from].value) - all[i].value);
     if (off > worst) {
       worst = off;
       farthest = i;
@@ -42,8 +42,8 @@ double ViewCurve::operator()(double cosine) const {
 
 ViewCurve ViewCurve::following(const std::function<double(double)>& function, double tolerance) {
   std::vector<Point> all;
-  for (int i = 0; i < entries; ++i) {
-    const double cosine = double(i) / (entries - 1);
+  for (int i = 0; i <= steps; ++i) {
+    const double cosine = double(i) / steps;
     all.push_back({cosine, function(cosine)});
   }
   const auto [least, greatest] = std::minmax_element(
@@ -64,8 +64,7 @@ ViewCurve ViewCurve::following(const std::function<double(double)>& function, do
 ViewSplines::Support ViewSplines::at(double cosine) {
   constexpr int intervals = count - 3;
   const double root = std::sqrt(std::clamp(cosine, 0.0, 1.0));
-  const double place =
-      intervals * std::clamp((root - least_root) / (1 - least_root), 0.0, 1.0);
+  const double place = intervals * std::clamp((root - least_root) / (1 - least_root), 0.0, 1.0);
   const int first = std::min(static_cast<int>(place), intervals - 1);
   const double t = place - first, u = 1 - t;
   return {first,
