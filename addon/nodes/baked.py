@@ -4,8 +4,8 @@ The group shows an entry of a record's `closures`: a diffuse closure and some be
 or Beckmann ones (native/closures/closure_set.h computes the same in C++). One RGB Curve node with
 the cosine of the view angle in all three channels holds a closure's roughness, anisotropy and
 bend, a second one its weight; curves that hardly vary are constants on the sockets, and what is
-black is left out. The curves' points stand on the entries of the table that Cycles makes of a
-curve, so that nothing is lost.
+black is left out. The curves' points stand on the entries of the tables of 256 steps through which
+Blender and Cycles read a curve, so that nothing is lost.
 """
 
 from collections.abc import Mapping, Sequence

@@ -6,7 +6,7 @@
 namespace lobefit {
 namespace {
 
-constexpr int entries = 256;
+constexpr int steps = 256;
 
 // Marks the points needed between two that are kept, by the one that is farthest off the line.
 void keep_needed(const std::vector<ViewCurve::Point>& all, std::size_t from, std::size_t to,
@@ -42,8 +42,8 @@ double ViewCurve::operator()(double cosine) const {
 
 ViewCurve ViewCurve::following(const std::function<double(double)>& function, double tolerance) {
   std::vector<Point> all;
-  for (int i = 0; i < entries; ++i) {
-    const double cosine = double(i) / (entries - 1);
+  for (int i = 0; i <= steps; ++i) {
+    const double cosine = double(i) / steps;
     all.push_back({cosine, function(cosine)});
   }
   const auto [least, greatest] = std::minmax_element(

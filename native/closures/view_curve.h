@@ -9,8 +9,9 @@
 namespace lobefit {
 
 // A piecewise linear function of the cosine of the view angle, as Cycles evaluates a curve node
-// with vector handles: constant beyond its first and last point. The points stand on the entries
-// of the table of 256 that Cycles makes of a curve, so that the table loses nothing.
+// with vector handles: constant beyond its first and last point. Blender and Cycles read a curve
+// through tables of 256 equal steps from its first to its last point; points from 0 to 1 at
+// multiples of 1/256 stand on their entries, so that the tables lose nothing.
 class ViewCurve {
  public:
   struct Point {

@@ -11,6 +11,7 @@ import shutil
 import sys
 import tempfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -23,6 +24,8 @@ profile = Path(tempfile.mkdtemp(prefix="lobefit-profile-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(profile)
 
 import bpy  # noqa: E402 (Blender looks for its profile while it is imported)
+import facets  # noqa: E402
+import numpy as np  # noqa: E402
 
 
 def newest_package() -> Path:
@@ -104,3 +107,17 @@ def material(addon: ModuleType, measured_file: str) -> bpy.types.Material:
     """The imported measurement as a material; there is no other in the file."""
     bpy.ops.lobefit.import_measured(filepath=measured_file)
     return bpy.data.materials[0]
+
+
+@pytest.fixture
+def render(tmp_path: Path) -> Callable[..., np.ndarray]:
+    """Renders f cos of (N, 3) normals under one sun, exactly: (N, 3), by rows from below."""
+
+    def rendered(material, light, normals=None, turn=None, flip=False):
+        mesh = facets.facet_mesh(facets.sphere_normals() if normals is None else normals)
+        mesh.materials.append(material)
+        if flip:
+            mesh.flip_normals()
+        return facets.render_facets(tmp_path, mesh, light, turn)
+
+    return rendered

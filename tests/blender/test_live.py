@@ -7,9 +7,9 @@ import bpy
 import lobefit._native
 import numpy as np
 import pytest
+from facets import SIZE, UP, light_at, local, sphere_normals
 from mathutils import Matrix, Vector
 
-SIZE = 48
 PRINCIPLED = {
     "base_color": [0.1, 0.2, 0.3],
     "metallic": 0.0,
@@ -17,7 +17,6 @@ PRINCIPLED = {
     "ior": 1.5,
     "specular_tint": [1.0, 1.0, 1.0],
 }
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def lobe(**changes):
@@ -47,90 +46,6 @@ def record(parameters):
 def build(addon):
     """Builds the material of parameters."""
     return lambda **changes: addon.nodes.material.build_material(record(lobe(**changes)))
-
-
-def light_at(phase):
-    """A direction at this angle (degrees) from the camera, which looks down -z."""
-    a = np.radians(phase)
-    return np.array([np.sin(a) * 0.8, np.sin(a) * 0.6, np.cos(a)])
-
-
-def sphere_normals():
-    """The normals (N, 3) of a sphere's pixels, by rows from below; straight up outside of it."""
-    place = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
-    x, y = np.meshgrid(place, place)
-    z2 = 1 - x**2 - y**2
-    normals = np.stack([x, y, np.sqrt(np.maximum(z2, 0))], -1).reshape(-1, 3)
-    return np.where(z2.reshape(-1, 1) > 0.1**2, normals, UP)
-
-
-def facet_mesh(normals):
-    """One flat quadrilateral a pixel with the pixel's normal: so no mesh error enters."""
-    row, column = np.divmod(np.arange(len(normals)), SIZE)
-    vertices = np.zeros((len(normals), 4, 3))
-    for k, (dx, dy) in enumerate([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]):
-        vertices[:, k, 0], vertices[:, k, 1] = column + 0.5 + dx, row + 0.5 + dy
-        vertices[:, k, 2] = -(normals[:, 0] * dx + normals[:, 1] * dy) / normals[:, 2]
-    vertices -= [SIZE / 2, SIZE / 2, 0]
-    mesh = bpy.data.meshes.new("facets")
-    faces = np.arange(4 * len(normals)).reshape(-1, 4)
-    mesh.from_pydata(vertices.reshape(-1, 3).tolist(), [], faces.tolist())
-    return mesh
-
-
-@pytest.fixture
-def render(tmp_path):
-    """Renders f cos of (N, 3) normals under one sun, exactly: (N, 3), by rows from below."""
-
-    def rendered(material, light, normals=None, turn=None, flip=False):
-        turn = turn or Matrix.Identity(4)
-        bpy.ops.scene.new(type="EMPTY")
-        scene = bpy.context.scene
-        scene.world = None
-        mesh = facet_mesh(sphere_normals() if normals is None else normals)
-        if flip:
-            mesh.flip_normals()
-        mesh.materials.append(material)
-        camera = bpy.data.cameras.new("camera")
-        camera.type, camera.ortho_scale, camera.clip_end = "ORTHO", SIZE, 1e4
-        sun = bpy.data.lights.new("sun", "SUN")
-        sun.energy, sun.angle, sun.use_shadow = 1.0, 0.0, False
-        toward = Vector(light).to_track_quat("Z", "Y").to_matrix().to_4x4()
-        places = {mesh: Matrix.Identity(4), camera: Matrix.Translation((0, 0, 999)), sun: toward}
-        for data, place in places.items():
-            item = bpy.data.objects.new(data.name, data)
-            item.matrix_world = turn @ place
-            scene.collection.objects.link(item)
-            if data == camera:
-                scene.camera = item
-        cycles, settings = scene.cycles, scene.render
-        settings.engine = "CYCLES"
-        cycles.device, cycles.samples, cycles.max_bounces, cycles.seed = "CPU", 1, 0, 0
-        cycles.use_adaptive_sampling = cycles.use_denoising = False
-        cycles.light_sampling_threshold, cycles.pixel_filter_type = 0.0, "BOX"
-        settings.resolution_x = settings.resolution_y = SIZE
-        settings.resolution_percentage = 100
-        settings.image_settings.file_format = "OPEN_EXR"
-        settings.image_settings.color_depth, settings.image_settings.color_mode = "32", "RGB"
-        settings.filepath = str(tmp_path / "facets.exr")
-        bpy.ops.render.render(write_still=True, scene=scene.name)
-        image = bpy.data.images.load(settings.filepath)
-        image.colorspace_settings.is_data = True
-        pixels = np.empty(len(image.pixels), np.float32)
-        image.pixels.foreach_get(pixels)
-        bpy.data.images.remove(image)
-        return pixels.reshape(SIZE * SIZE, -1)[:, :3].astype(float)
-
-    return rendered
-
-
-def local(normals, direction):
-    """A direction (3) in frames whose z axes are the normals (N, 3): (N, 3)."""
-    side = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
-    tangent = np.cross(side, normals)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    frame = np.stack([tangent, np.cross(normals, tangent), normals], 1)
-    return frame @ direction
 
 
 def mirrored(parameters, light, normals):

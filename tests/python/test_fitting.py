@@ -1,5 +1,6 @@
 """Fits through the Python interface."""
 
+import dataclasses
 import hashlib
 import inspect
 import time
@@ -97,10 +98,94 @@ def test_unknown_options_are_named(table, option, value):
         lobefit.fit(table, **{option: value})
 
 
+@pytest.fixture(scope="module")
+def approximated(table):
+    """The record of a table with one closure, without a file behind it."""
+    return lobefit.closures(lobefit.read(table), count=1)
+
+
+def test_closures_are_read_back_the_same(approximated, tmp_path):
+    approximated.save(tmp_path / "truth.json")
+    assert lobefit.Record.load(tmp_path / "truth.json").closures == approximated.closures
+
+
+def test_an_entry_tells_what_was_asked_for(approximated):
+    (entry,) = approximated.closures
+    assert (entry["target"], entry["count"], entry["cap_albedo"]) == ("measured", 1, False)
+    assert len(entry["specular"]) == 1
+    assert 0 < entry["error"] < 0.1
+    assert entry["seconds"] > 0
+    views = entry["by_view"]
+    assert len(views["view_angle"]) == len(views["relative_error"])
+    excess = np.array(views["closures_albedo"]) / np.array(views["target_albedo"])
+    assert excess.max() <= 1.02
+
+
+def test_an_entry_is_what_the_error_says(approximated, truth):
+    # Seen at 45 degrees by lights of the plane of incidence; the error is a mean of all others too.
+    angles = np.radians(np.linspace(-80, 80, 81))
+    lights = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], -1)
+    viewers = np.tile([0.5**0.5, 0.0, 0.5**0.5], (len(angles), 1))
+    lobe = lobefit._native.evaluate_model(truth, lights, viewers) * lights[:, 2:]
+    found = lobefit._native.evaluate_closures(approximated.closures[0], lights, viewers)
+    assert np.abs(found - lobe).sum() / lobe.sum() < 3 * approximated.closures[0]["error"]
+
+
+def test_closures_are_added_to_a_record_and_replaced(recovered):
+    record = lobefit.closures(recovered, count=0)
+    record = lobefit.closures(record, target="lobe", count=0)
+    record = lobefit.closures(record, count=0, cap_albedo=True)
+    kept = [(entry["target"], entry["count"], entry["cap_albedo"]) for entry in record.closures]
+    assert kept == [("lobe", 0, False), ("measured", 0, True)]
+    assert recovered.closures == []
+    assert record.parameters == recovered.parameters
+
+
+def test_a_tolerance_takes_as_few_closures_as_keep_to_it(recovered):
+    (entry,) = lobefit.closures(recovered, target="lobe", tolerance=0.99).closures
+    assert entry["count"] == 0
+
+
+def test_closures_of_a_record_without_its_measurement(recovered, tmp_path):
+    gone = tmp_path / "gone.binary"
+    record = dataclasses.replace(recovered, source={**recovered.source, "path": str(gone)})
+    with pytest.raises(lobefit.InputError, match=r"found no such file\.$") as caught:
+        lobefit.closures(record, count=0)
+    assert str(caught.value).startswith(f"{gone}: expected ")
+    assert lobefit.closures(record, target="lobe", count=0).closures[0]["target"] == "lobe"
+
+
+def test_a_record_that_never_had_a_file_has_no_measurement(approximated):
+    with pytest.raises(lobefit.InputError, match=r"^measurement: expected .*no such file\.$"):
+        lobefit.closures(approximated, count=0)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "sentence"),
+    [
+        ("target", "albedo", "target: expected measured or lobe, found 'albedo'."),
+        ("count", 4, "closures: expected 0 to 3, found 4."),
+        ("count", -1, "closures: expected 0 to 3, found -1."),
+    ],
+)
+def test_wrong_requests_for_closures_are_named(recovered, option, value, sentence):
+    with pytest.raises(lobefit.InputError) as caught:
+        lobefit.closures(recovered, **{option: value})
+    assert str(caught.value) == sentence
+
+
+def test_a_cancelled_search_for_closures_has_no_record(recovered):
+    job = lobefit.start_fit(recovered, closures=[lobefit.Closures(count=3)])
+    job.cancel()
+    with pytest.raises(lobefit.Cancelled):
+        job.record()
+
+
 def test_the_interface_is_typed():
     for name in lobefit.__all__:
         assert hasattr(lobefit, name)
-    for function in (lobefit.read, lobefit.fit, lobefit.start_fit, fitting.Job.wait):
+    functions = (lobefit.read, lobefit.fit, lobefit.start_fit, lobefit.closures, fitting.Job.wait)
+    for function in functions:
         hints = typing.get_type_hints(function)
         parameters = [name for name in inspect.signature(function).parameters if name != "self"]
         assert {"return", *parameters} == hints.keys()

@@ -47,6 +47,48 @@ def test_a_record_is_called_by_its_sample_name_first(record):
     assert record.name == "gold (from a paper)"
 
 
+CURVE = [[0.0, 1 / 3], [0.2, 5e-324], [1.0, 1e300 / 7]]
+
+
+def closures(**changes):
+    """An entry of a record's closures, with numbers that no short decimal can hold."""
+    specular = {
+        "distribution": "beckmann",
+        "roughness": CURVE,
+        "anisotropy": [[0.0, -1 / 7]],
+        "bend": CURVE,
+        "weight": [CURVE] * 3,
+    }
+    return {
+        "target": "measured",
+        "count": 1,
+        "cap_albedo": False,
+        "error": 1 / 3,
+        "seconds": 2 / 3,
+        "by_view": {
+            "view_angle": [1 / 3],
+            "target_albedo": [[0.1, 0.2, 1 / 3]],
+            "closures_albedo": [[0.1, 0.2, 1 / 7]],
+            "relative_error": [1 / 9],
+        },
+        "diffuse": [CURVE] * 3,
+        "specular": [specular],
+        **changes,
+    }
+
+
+def test_closures_are_exact_when_read_back(record, tmp_path):
+    record.closures = [closures(target="lobe", count=0, specular=[]), closures()]
+    record.save(tmp_path / "gold.json")
+    assert Record.load(tmp_path / "gold.json") == record
+
+
+def test_a_record_of_an_earlier_version_has_no_closures(record):
+    data = json.loads(record.to_json())
+    data.pop("closures", None)
+    assert Record.from_json(json.dumps(data)).closures == []
+
+
 def change(data, path, value):
     """Sets the entry at `path` of nested objects and lists; a value of ... removes it."""
     *outer, last = path
@@ -88,11 +130,21 @@ def change(data, path, value):
         (["principled", "roughness"], 2, "a number from 0 to 1, found 2."),
         (["norm"], "l3", "expected norm to be one of l1, cosine-l1, l2, log-l2"),
         (["max_angle"], 91, "expected max_angle to be a number from 0 to 90, found 91."),
+        (["closures"], {}, "expected closures to be a list, found {}."),
+        (["closures", 0, "target"], "model", "closures[0].target to be one of measured, lobe"),
+        (["closures", 0, "count"], -1, "closures[0].count to be a whole number of at least 0"),
+        (["closures", 0, "error"], None, "expected closures[0].error to be a number of at least 0"),
+        (["closures", 0, "diffuse"], [], "closures[0].diffuse to be a list of 3, found []."),
+        (["closures", 0, "specular", 0, "distribution"], "ward", "to be one of ggx, beckmann"),
+        (["closures", 0, "specular", 0, "bend"], [], "bend to be points of rising cosine, at"),
+        (["closures", 0, "specular", 0, "bend", 1, 0], 0, "bend to be points of rising cosine"),
+        (["closures", 0, "specular", 0, "bend", 0], [0], "bend[0] to be a list of 2, found [0]."),
         (["models"], [], "expected models to be an object, found []."),
         (["models"], {"ward": {}}, "expected the key in models to be one of modified-phong"),
     ],
 )
 def test_what_is_wrong_is_named(record, tmp_path, path, value, sentence):
+    record.closures = [closures()]
     data = json.loads(record.to_json())
     change(data, path, value)
     file = tmp_path / "gold.json"

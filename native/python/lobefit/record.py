@@ -1,6 +1,7 @@
 """The record: one JSON file that holds all a fit found out, and all that a material needs."""
 
 import dataclasses
+import itertools
 import json
 import math
 import os
@@ -245,6 +246,13 @@ def _list(item: _Check, length: int | None = None) -> _Check:
     return check
 
 
+def _curve(value: Any, where: str) -> None:
+    _list(_list(_NUMBER, 2))(value, where)
+    cosines = [cosine for cosine, _ in value]
+    if not cosines or any(a >= b for a, b in itertools.pairwise(cosines)):
+        raise _Mismatch(where, "points of rising cosine, at least one", value)
+
+
 def _object(required: dict[str, _Check], optional: dict[str, _Check] | None = None) -> _Check:
     """An object with these keys; keys of a later version are no error."""
 
@@ -340,7 +348,6 @@ _FIT: dict[str, _Check] = {
     "warnings": _list(_TEXT),
     "principled": _PRINCIPLED,
 }
-_CURVE = _list(_list(_NUMBER, 2))
 _CLOSURES = _object(
     {
         "target": _choice("measured", "lobe"),
@@ -356,15 +363,15 @@ _CLOSURES = _object(
                 "relative_error": _list(_AMOUNT),
             }
         ),
-        "diffuse": _list(_CURVE, 3),
+        "diffuse": _list(_curve, 3),
         "specular": _list(
             _object(
                 {
                     "distribution": _choice("ggx", "beckmann"),
-                    "roughness": _CURVE,
-                    "anisotropy": _CURVE,
-                    "bend": _CURVE,
-                    "weight": _list(_CURVE, 3),
+                    "roughness": _curve,
+                    "anisotropy": _curve,
+                    "bend": _curve,
+                    "weight": _list(_curve, 3),
                 }
             )
         ),

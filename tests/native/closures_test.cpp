@@ -1,0 +1,377 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "closures/closure_set.h"
+#include "closures/fit_closures.h"
+#include "closures/microfacet.h"
+#include "closures/target.h"
+#include "closures/view_curve.h"
+#include "reflectance/abc.h"
+
+namespace lobefit {
+namespace {
+
+constexpr Distribution both[] = {Distribution::ggx, Distribution::beckmann};
+
+Vector3 at_angle(double theta, double phi = 0) {
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+double evaluate(Distribution distribution, const Shape& shape, const Vector3& wi,
+                const Vector3& wo) {
+  return Microfacet(distribution, shape, wo).evaluate(wi, (wi + wo).normalized());
+}
+
+// Smith's slope (alpha tan theta)^2 of a direction above a bent normal.
+double smith_slope(const Shape& shape, const Vector3& w) {
+  const Vector3 normal = Vector3(shape.tilt, 0, 1).normalized();
+  const Vector3 tangent(normal.z(), 0, -normal.x());
+  const double z = w.dot(normal);
+  return (std::pow(std::exp(shape.log_alpha_x) * w.dot(tangent), 2) +
+          std::pow(std::exp(shape.log_alpha_y) * w.y(), 2)) /
+         (z * z);
+}
+
+RgbCurve grey(double value) { return {ViewCurve(value), ViewCurve(value), ViewCurve(value)}; }
+
+// A GGX closure whose curves vary with the view, isotropic at normal incidence.
+ClosureSet known_closures() {
+  const auto curve = [](double (*function)(double)) {
+    return ViewCurve::following(function, 1e-5);
+  };
+  SpecularClosure closure;
+  closure.roughness = curve([](double c) { return 0.45 - 0.1 * c; });
+  closure.anisotropy = curve([](double c) { return 0.3 * (1 - c * c); });
+  closure.bend = curve([](double c) { return 0.1 + 0.1 * c; });
+  closure.weight = {curve([](double c) { return 0.9 - 0.3 * c; }),
+                    curve([](double c) { return 0.7 - 0.2 * c; }), ViewCurve(0.4)};
+  return {grey(0), {closure}};
+}
+
+// f of closures: a target is without the light's cosine.
+Reflectance reflectance_of(const ClosureSet& closures) {
+  return [=](const Vector3& wi, const Vector3& wo) {
+    return Rgb(evaluate_closures(closures, wi, wo) / wi.z());
+  };
+}
+
+Reflectance f_times_cosine(const ClosureSet& closures) {
+  return [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
+}
+
+FittedClosures fitted(const Target& target, const ClosureFitOptions& options) {
+  Monitor monitor;
+  return fit_closures(target, options, monitor);
+}
+
+void expect_equal(const ViewCurve& a, const ViewCurve& b) {
+  ASSERT_EQ(a.points().size(), b.points().size());
+  for (std::size_t i = 0; i < a.points().size(); ++i) {
+    EXPECT_EQ(a.points()[i].cosine, b.points()[i].cosine);
+    EXPECT_EQ(a.points()[i].value, b.points()[i].value);
+  }
+}
+
+TEST(ClosuresMicrofacet, DerivativesAreThoseOfTheValue) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> part(0, 1);
+  int compared = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Distribution distribution = both[i % 2];
+    const Shape shape{-3 * part(random), -3 * part(random), 1.2 * part(random) - 0.4};
+    const Vector3 wo = at_angle(1.5 * part(random));
+    const Vector3 wi = at_angle(1.5 * part(random), 2 * pi * part(random));
+    const Vector3 half = (wi + wo).normalized();
+    constexpr double step = 1e-5;
+    const auto near_step = [&](const Vector3& w) {
+      return std::abs(smith_slope(shape, w) / 0.39 - 1) < 0.01;
+    };
+    // At the closure's own horizon no step is small.
+    const Vector3 normal = Vector3(shape.tilt, 0, 1).normalized();
+    if (normal.dot(wi) < 0.1 || normal.dot(wo) < 0.1) continue;
+    // Lambda of Beckmann jumps there.
+    if (distribution == Distribution::beckmann && (near_step(wi) || near_step(wo))) continue;
+    const ShapeValue value =
+        Microfacet(distribution, shape, wo).evaluate_with_derivatives(wi, half);
+    if (value.value < 1e-9) continue;
+    EXPECT_EQ(value.value, evaluate(distribution, shape, wi, wo));
+    const auto difference = [&](double Shape::*parameter) {
+      Shape less = shape, more = shape;
+      less.*parameter -= step;
+      more.*parameter += step;
+      return std::log(evaluate(distribution, more, wi, wo) / evaluate(distribution, less, wi, wo)) /
+             (2 * step);
+    };
+    // Central differences are off by the square of the step times third derivatives, which grow
+    // with the steepness of the logarithm.
+    const auto expect_near = [](double derivative, double by_difference) {
+      EXPECT_NEAR(derivative, by_difference, 1e-6 * (1 + std::abs(by_difference)));
+    };
+    expect_near(value.by_log_alpha_x, difference(&Shape::log_alpha_x));
+    expect_near(value.by_log_alpha_y, difference(&Shape::log_alpha_y));
+    expect_near(value.by_tilt, difference(&Shape::tilt));
+    ++compared;
+  }
+  EXPECT_GT(compared, 2000);
+}
+
+TEST(ClosuresMicrofacet, IsReciprocalButForTheCosine) {
+  for (const Distribution distribution : both) {
+    // Light and viewer on the same meridian, so that both see the tangent alike.
+    const Shape shape{std::log(0.5), std::log(0.2), 0};
+    const Vector3 a = at_angle(1.2), b = at_angle(0.7);
+    // Rounding alone differs.
+    EXPECT_NEAR(evaluate(distribution, shape, a, b) * b.z(),
+                evaluate(distribution, shape, b, a) * a.z(), 1e-13);
+    const Shape isotropic{std::log(0.4), std::log(0.4), 0};
+    const Vector3 c = at_angle(0.9, 2);
+    const Vector3 turned_b = at_angle(0.7, -2), turned_c = at_angle(0.9);
+    EXPECT_NEAR(evaluate(distribution, isotropic, c, b) * b.z(),
+                evaluate(distribution, isotropic, turned_b, turned_c) * c.z(), 1e-13);
+  }
+}
+
+TEST(ClosuresMicrofacet, IsDarkBelowItsOwnHorizon) {
+  for (const Distribution distribution : both) {
+    const Shape shape{std::log(0.5), std::log(0.5), 1};
+    EXPECT_EQ(evaluate(distribution, shape, at_angle(-0.8), at_angle(0.2)), 0);
+    EXPECT_EQ(evaluate(distribution, {-1, -1, -1}, at_angle(0), at_angle(0.8)), 0);
+  }
+}
+
+TEST(ClosuresMicrofacet, ReflectsNoMoreThanItReceives) {
+  constexpr int rings = 120, sectors = 60;
+  for (const Distribution distribution : both) {
+    for (const double alpha_x : {0.05, 0.3, 1.0}) {
+      for (const double alpha_y : {0.05, 0.3, 1.0}) {
+        for (const double angle : {0.0, 0.5, 1.0, 1.4}) {
+          const Shape shape{std::log(alpha_x), std::log(alpha_y), 0};
+          const Vector3 wo = at_angle(angle);
+          const Microfacet closure(distribution, shape, wo);
+          double albedo = 0;
+          for (int ring = 0; ring < rings; ++ring) {
+            const double t = (ring + 0.5) / rings, theta = t * t * pi / 2;
+            for (int sector = 0; sector < sectors; ++sector) {
+              const Vector3 half = at_angle(theta, 2 * pi * (sector + 0.5) / sectors);
+              const double incidence = wo.dot(half);
+              const Vector3 wi = 2 * incidence * half - wo;
+              if (!(incidence > 0 && wi.z() > 0)) continue;
+              albedo += closure.evaluate(wi, half) * 4 * incidence * std::sin(theta) *
+                        (t * pi / rings) * (2 * pi / sectors);
+            }
+          }
+          // Quadrature is off by a thousandth, and Beckmann's approximate Lambda by a little more.
+          EXPECT_LT(albedo, 1.005) << alpha_x << ' ' << alpha_y << ' ' << angle;
+          EXPECT_GT(albedo, 0.3) << alpha_x << ' ' << alpha_y << ' ' << angle;
+        }
+      }
+    }
+  }
+}
+
+TEST(Closures, SocketsAndShapesAreInverse) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> part(0, 1);
+  for (int i = 0; i < 1000; ++i) {
+    // An anisotropy of 0.99 is the most that the node takes: alphas 1e4 apart.
+    const Shape shape{-4 * part(random), -4 * part(random), 2 * part(random) - 1};
+    const double sine = 0.01 + 0.99 * part(random);
+    const ClosureSockets sockets = to_sockets(shape, sine);
+    const Shape back = to_shape(sockets, sine);
+    EXPECT_NEAR(back.log_alpha_x, shape.log_alpha_x, 1e-12);
+    EXPECT_NEAR(back.log_alpha_y, shape.log_alpha_y, 1e-12);
+    EXPECT_NEAR(back.tilt, shape.tilt, 1e-12);
+    EXPECT_LE(std::abs(sockets.anisotropy), 0.99);
+  }
+}
+
+TEST(Closures, SocketsAreThoseOfTheNode) {
+  // alpha = Roughness^2; with Anisotropy A >= 0 it is times (1 - A) along the tangent, over (1 - A)
+  // across it, and the other way round for A < 0; what exceeds 1 is clipped.
+  const Shape along = to_shape({0.5, 0.5, 0}, 0.6), across = to_shape({0.5, -0.5, 2}, 0.6);
+  EXPECT_NEAR(std::exp(along.log_alpha_x), 0.125, 1e-12);
+  EXPECT_NEAR(std::exp(along.log_alpha_y), 0.5, 1e-12);
+  EXPECT_NEAR(std::exp(across.log_alpha_x), 0.5, 1e-12);
+  EXPECT_NEAR(std::exp(across.log_alpha_y), 0.125, 1e-12);
+  EXPECT_NEAR(across.tilt, 1.2, 1e-12);
+  EXPECT_EQ(to_shape({0.9, 0.8, 0}, 0.6).log_alpha_y, 0);
+  EXPECT_EQ(to_sockets({-1, -1, 0.3}, 0).bend, 0);
+}
+
+TEST(Closures, TheViewMayStandAnywhere) {
+  const ClosureSet closures = known_closures();
+  const Vector3 wi = at_angle(0.7, 0.4), wo = at_angle(0.9, 0);
+  const Vector3 turned_wi = at_angle(0.7, 2.5), turned_wo = at_angle(0.9, 2.1);
+  const Rgb value = evaluate_closures(closures, wi, wo);
+  // Rounding alone differs.
+  EXPECT_TRUE(value.isApprox(evaluate_closures(closures, turned_wi, turned_wo), 1e-12));
+  EXPECT_TRUE((evaluate_closures(closures, -wi, wo) == 0).all());
+  EXPECT_TRUE((evaluate_closures(closures, wi, -wo) == 0).all());
+}
+
+TEST(ClosuresViewCurve, FollowsWithinItsTolerance) {
+  const auto function = [](double c) { return std::sqrt(c) + 0.1 * std::sin(12 * c); };
+  std::size_t most = 258;
+  for (const double tolerance : {1e-4, 1e-3, 1e-2}) {
+    const ViewCurve curve = ViewCurve::following(function, tolerance);
+    for (int i = 0; i <= 256; ++i) {
+      const double cosine = i / 256.0;
+      EXPECT_LE(std::abs(curve(cosine) - function(cosine)), tolerance * (1 + 1e-9));
+    }
+    EXPECT_EQ(curve.points().front().cosine, 0);
+    EXPECT_EQ(curve.points().back().cosine, 1);
+    EXPECT_LT(curve.points().size(), most);
+    most = curve.points().size();
+  }
+}
+
+TEST(ClosuresViewCurve, AConstantIsOnePoint) {
+  const ViewCurve curve = ViewCurve::following([](double c) { return 3 + 1e-4 * c; }, 1e-4);
+  EXPECT_TRUE(curve.constant());
+  EXPECT_NEAR(curve(0.3), 3, 1e-4);
+  EXPECT_EQ(curve(0.3), curve(0.8));
+}
+
+TEST(ClosuresViewCurve, PointsStandOnTheEntriesOfTables) {
+  const ViewCurve curve = ViewCurve::following([](double c) { return std::sqrt(c); }, 1e-3);
+  for (const auto& point : curve.points()) {
+    EXPECT_EQ(point.cosine * 256, std::round(point.cosine * 256));
+  }
+}
+
+TEST(ClosuresViewCurve, SplinesSumToOne) {
+  const std::vector<double> ones(ViewSplines::count, 1);
+  for (int i = 0; i <= 1000; ++i) {
+    const auto [first, share] = ViewSplines::at(i / 1000.0);
+    EXPECT_GE(first, 0);
+    EXPECT_LE(first + 4, ViewSplines::count);
+    double sum = 0;
+    for (const double part : share) {
+      EXPECT_GE(part, 0);
+      sum += part;
+    }
+    EXPECT_NEAR(sum, 1, 1e-15);
+    EXPECT_NEAR(ViewSplines::evaluate(ones.data(), i / 1000.0), 1, 1e-15);
+  }
+}
+
+TEST(ClosuresTarget, BlackHasTheErrorOne) {
+  for (const std::string_view name : {"nickel", "red-fabric2"}) {
+    const auto measurement = sample_measurement(name);
+    const Target target = sample_target(
+        [&](const Vector3& wi, const Vector3& wo) { return measurement.evaluate(wi, wo); });
+    EXPECT_NEAR(error_of(target, [](const Vector3&, const Vector3&) { return Rgb(Rgb::Zero()); }),
+                1, 1e-12);
+  }
+}
+
+TEST(ClosuresTarget, ScaleCountsForNothing) {
+  ClosureSet closures = known_closures();
+  const Reflectance f = reflectance_of(closures);
+  const Target target = sample_target(f);
+  const Target scaled =
+      sample_target([&](const Vector3& wi, const Vector3& wo) { return Rgb(1000 * f(wi, wo)); });
+  EXPECT_LT(error_of(target, f_times_cosine(closures)), 1e-12);
+  closures.specular[0].roughness = ViewCurve(0.5);
+  const double error = error_of(target, f_times_cosine(closures));
+  EXPECT_GT(error, 0.1);
+  EXPECT_NEAR(error_of(scaled,
+                       [&](const Vector3& wi, const Vector3& wo) {
+                         return Rgb(1000 * evaluate_closures(closures, wi, wo));
+                       }),
+              error, 1e-9);
+}
+
+TEST(ClosuresTarget, UnknownLightsAreLeftOut) {
+  const Target target = sample_target([](const Vector3& wi, const Vector3&) {
+    return Rgb(Rgb::Constant(wi.y() > 0 ? 1 : std::nan("")));
+  });
+  ASSERT_FALSE(target.empty());
+  for (const TargetView& view : target) {
+    for (const TargetLight& light : view.lights) EXPECT_GT(light.wi.y(), 0);
+  }
+}
+
+TEST(ClosuresFit, FindsWhatIsKnown) {
+  const ClosureSet known = known_closures();
+  const Target target = sample_target(reflectance_of(known));
+  const FittedClosures one = fitted(target, {.specular = 1, .threads = 1});
+  EXPECT_LT(one.error, 0.005);
+  ASSERT_EQ(one.closures.specular.size(), 1u);
+  EXPECT_EQ(one.closures.specular[0].distribution, Distribution::ggx);
+  for (const double cosine : {0.3, 0.6, 0.9}) {
+    const SpecularClosure &found = one.closures.specular[0], &expected = known.specular[0];
+    // What an error of half a percent leaves of the parameters.
+    EXPECT_NEAR(found.roughness(cosine), expected.roughness(cosine), 0.005);
+    EXPECT_NEAR(found.weight[1](cosine), expected.weight[1](cosine), 0.01);
+  }
+
+  const FittedClosures again = fitted(target, {.specular = 1, .threads = 2});
+  EXPECT_EQ(again.error, one.error);
+  ASSERT_EQ(again.closures.specular.size(), one.closures.specular.size());
+  const SpecularClosure &a = one.closures.specular[0], &b = again.closures.specular[0];
+  expect_equal(a.roughness, b.roughness);
+  expect_equal(a.anisotropy, b.anisotropy);
+  expect_equal(a.bend, b.bend);
+  for (std::size_t c = 0; c < 3; ++c) expect_equal(a.weight[c], b.weight[c]);
+}
+
+TEST(ClosuresFit, AddsNoEnergy) {
+  const auto measurement = sample_measurement("nickel");
+  const Target target = sample_target(
+      [&](const Vector3& wi, const Vector3& wo) { return measurement.evaluate(wi, wo); });
+  for (const SeenAtAngle& at : fitted(target, {.specular = 1}).by_view) {
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_LE(at.closures_albedo[c], 1.02 * at.target_albedo[c]) << at.cosine;
+    }
+  }
+}
+
+TEST(ClosuresFit, CapsTheAlbedoWhereItIsAskedTo) {
+  ClosureSet bright = known_closures();
+  bright.specular[0].weight = grey(1.6);
+  const Target target = sample_target(reflectance_of(bright));
+  const auto greatest = [&](bool cap) {
+    double most = 0;
+    for (const auto& at : fitted(target, {.specular = 1, .cap_albedo = cap}).by_view) {
+      most = std::max(most, at.closures_albedo.maxCoeff());
+    }
+    return most;
+  };
+  EXPECT_GT(greatest(false), 1.2);
+  // The curve of the weight keeps to a 500th.
+  EXPECT_LE(greatest(true), 1.005);
+}
+
+TEST(ClosuresFit, BlackNeedsNoClosures) {
+  const Target target =
+      sample_target([](const Vector3&, const Vector3&) { return Rgb(Rgb::Zero()); });
+  EXPECT_TRUE(target.empty());
+  const FittedClosures none = fitted(target, {});
+  EXPECT_EQ(none.error, 0);
+  EXPECT_TRUE(none.closures.specular.empty());
+  EXPECT_TRUE((evaluate_closures(none.closures, at_angle(0.2), at_angle(0.4)) == 0).all());
+}
+
+TEST(ClosuresFit, TakesAsFewAsSuffice) {
+  const ClosureSet grey_diffuse{grey(0.5), {}};
+  const Target target = sample_target(reflectance_of(grey_diffuse));
+  Monitor monitor;
+  const FittedClosures found = fit_closures_within(target, 0.01, {}, monitor);
+  EXPECT_LT(found.error, 0.01);
+  EXPECT_TRUE(found.closures.specular.empty());
+}
+
+TEST(ClosuresFit, CanBeCancelled) {
+  const Target target = sample_target(reflectance_of(known_closures()));
+  Monitor monitor;
+  monitor.cancel();
+  EXPECT_THROW(fit_closures(target, {}, monitor), Cancelled);
+}
+
+}  // namespace
+}  // namespace lobefit
