@@ -52,8 +52,9 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   contents.albedo = albedo_by_view_angle(*measurement, contents.fit.parameters);
   monitor.throw_if_cancelled();
   monitor.report("Finding the Principled BSDF", 0.98);
-  contents.principled = fit_principled(
+  const Target target = sample_target(
       [&](const Vector3& wi, const Vector3& wo) { return measurement->evaluate(wi, wo); });
+  contents.principled = fit_principled(target, options.threads);
   monitor.throw_if_cancelled();
   contents.total_seconds = seconds_since(start);
   return contents;

@@ -62,13 +62,16 @@ FacetGeometry facet_geometry(const Vector3& wi, const Vector3& wo) {
 
 Rgb evaluate_principled(const Principled& principled, const Vector3& wi, const Vector3& wo) {
   if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
-  PrincipledSockets<double> sockets;
-  Eigen::Map<Rgb>(sockets.base_color.data()) = principled.base_color;
-  Eigen::Map<Rgb>(sockets.specular_tint.data()) = principled.specular_tint;
-  sockets.metallic = principled.metallic;
-  sockets.roughness = principled.roughness;
-  sockets.reflectance_root = (principled.ior - 1) / (principled.ior + 1);
-  return Rgb(principled_terms(sockets, facet_geometry(wi, wo)).data());
+  const SharedSockets<double> shared = {principled.metallic, principled.roughness,
+                                        (principled.ior - 1) / (principled.ior + 1),
+                                        principled.specular_tint.maxCoeff()};
+  const auto light =
+      principled_at_light(shared, principled_at_view(shared, wo.z()), facet_geometry(wi, wo));
+  Rgb result;
+  for (int c = 0; c < 3; ++c) {
+    result[c] = principled_channel(light, principled.base_color[c], principled.specular_tint[c]);
+  }
+  return result;
 }
 
 }  // namespace lobefit

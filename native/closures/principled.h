@@ -1,14 +1,14 @@
 // Blender's Principled BSDF as Cycles 4.2 to 5.2 evaluate it, and the best one for any reflectance.
 #pragma once
 
+#include "closures/target.h"
 #include "measurement/vector3.h"
-#include "reflectance/reflectance.h"
 
 namespace lobefit {
 
 // The sockets of a Principled BSDF with the distribution "GGX" and every other socket at its
-// default: colours and metallic in [0, 1], roughness in [0, 1], ior >= 1. error is the relative L1
-// distance to the target it was fitted to, as fit_principled measures it.
+// default: colours and metallic in [0, 1], roughness in [0, 1], ior >= 1. error is the distance to
+// the target it was fitted to, by error_of.
 struct Principled {
   Rgb base_color = Rgb::Zero();
   double metallic = 0;
@@ -31,12 +31,10 @@ struct Principled {
 // reciprocal. A mirror (roughness below 0.0038, in 4.2 below 0.0266) shows no light of size 0.
 Rgb evaluate_principled(const Principled& principled, const Vector3& wi, const Vector3& wo);
 
-// The Principled BSDF that looks most like the target (f in 1/sr, without the cosine; NaN where it
-// is not known): the least relative L1 distance of f cos on spheres lit from angles of 4 to 166
-// degrees to the view, every angle counting alike. Always gives legal, finite sockets; a target
-// that is black or nowhere known gives a black one without a coat, with the error 0. roughness is
-// at least 0.03, ior at most 99. Takes some 0.1 s on one thread; the same target gives the same
-// result.
-Principled fit_principled(const Reflectance& target);
+// The Principled BSDF that is nearest to the target by error_of, the best of 32 starts. Always
+// gives legal, finite sockets; a target without samples gives a black one without a coat, with the
+// error 0. roughness is at least 0.03, ior at most 99. Takes some 0.16 s on one thread. threads: 0
+// for every processor; the result is the same for any number.
+Principled fit_principled(const Target& target, int threads = 0);
 
 }  // namespace lobefit

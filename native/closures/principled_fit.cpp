@@ -1,163 +1,175 @@
 #include <ceres/jet.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <vector>
 
 #include "closures/principled.h"
 #include "closures/principled_terms.h"
-#include "measurement/half_difference.h"
+#include "fitting/parallel.h"
 
 namespace lobefit {
 namespace {
 
-constexpr int unknowns = 9;
+// The unknowns are base colour, specular tint, metallic, ln(roughness) and (ior - 1) / (ior + 1).
+enum Unknown { base, tint = 3, metallic = 6, log_roughness, root, unknowns };
 using Vector = Eigen::Matrix<double, unknowns, 1>;
 using Matrix = Eigen::Matrix<double, unknowns, unknowns>;
-// One derivative more than needed: Eigen handles an even number of doubles twice as fast.
-using Dual = ceres::Jet<double, unknowns + 1>;
 
-// The unknowns are base colour, specular tint, metallic, ln(roughness) and (ior - 1) / (ior + 1).
 // A roughness below 0.0266 is a mirror to Cycles 4.2, which no sun shows; an ior of 99 reflects
 // nearly all.
 constexpr double least_roughness = 0.03;
 constexpr double greatest_root = 0.98;
 
-Vector least() {
-  Vector bound = Vector::Zero();
-  bound[7] = std::log(least_roughness);
+const Vector& least() {
+  static const Vector bound = [] {
+    Vector least = Vector::Zero();
+    least[log_roughness] = std::log(least_roughness);
+    return least;
+  }();
   return bound;
 }
 
-Vector greatest() {
-  Vector bound = Vector::Ones();
-  bound[7] = 0;
-  bound[8] = greatest_root;
+const Vector& greatest() {
+  static const Vector bound = [] {
+    Vector greatest = Vector::Ones();
+    greatest[log_roughness] = 0;
+    greatest[root] = greatest_root;
+    return greatest;
+  }();
   return bound;
 }
 
-template <typename T>
-PrincipledSockets<T> sockets_of(const std::array<T, unknowns>& x) {
-  using std::exp;
-  return {{x[0], x[1], x[2]}, {x[3], x[4], x[5]}, x[6], exp(x[7]), x[8]};
+// One channel depends on the four shared sockets and two of its own, in this order.
+constexpr int own_unknowns = 6;
+using Dual = ceres::Jet<double, own_unknowns>;
+
+// The unknown that each of them is.
+using OwnUnknowns = std::array<int, own_unknowns>;
+OwnUnknowns own_unknowns_of(int channel, int brightest_tint) {
+  return {metallic, log_roughness, root, tint + brightest_tint, base + channel, tint + channel};
 }
 
-// A pair of directions, what the target reflects there (f cos), and what a difference of 1 there
-// adds to the error. typical is the mean of the target's channels at the same light angle.
+int brightest_tint(const Vector& x) {
+  int brightest = 0;
+  x.segment<3>(tint).maxCoeff(&brightest);
+  return brightest;
+}
+
+// A light of the target, and the lights of a view.
 struct Sample {
   FacetGeometry at;
   Rgb target;
   double weight;
   double typical;
 };
-using Samples = std::vector<Sample>;
+struct View {
+  double n_wo;
+  std::vector<Sample> samples;
+};
+using Views = std::vector<View>;
 
-// The spheres of one angle between light and viewer, sampled around the highlight: rings of half
-// vectors that crowd toward the normal as the cube of their number, each weighted by its share of
-// the sphere's picture. Empty where nothing is known or all is black.
-Samples sample_sphere(const Reflectance& target, double theta_d) {
-  constexpr int rings = 24, sectors = 8;
-  // What is seen at a flatter angle is a hundredth of the sphere's picture.
-  const double least_n_wo = std::cos(radians(84));
-  // What is darker on the mean is black, and what is brighter could make sums infinite; no
-  // reflectance comes near either.
-  constexpr double darkest = 1e-12, brightest = 1e30;
-  Samples samples;
-  double area = 0, light = 0;
-  for (int ring = 0; ring < rings; ++ring) {
-    const auto edge = [](int number) {
-      const double part = double(number) / rings;
-      return part * part * part * (pi / 2);
-    };
-    const double theta_h = (edge(ring) + edge(ring + 1)) / 2;
-    const double width = std::cos(edge(ring)) - std::cos(edge(ring + 1));
-    for (int sector = 0; sector < sectors; ++sector) {
-      // A quarter of a step off, no azimuth is the mirror image of another.
-      const double phi_d = (sector + 0.25) / sectors * (2 * pi);
-      const auto [wi, wo] = to_directions({theta_h, theta_d, phi_d});
-      if (wi.z() <= 0 || wo.z() < least_n_wo) continue;
-      const Rgb value = target(wi, wo) * wi.z();
-      if (!value.isFinite().all()) continue;
-      samples.push_back(
-          {facet_geometry(wi, wo), value.cwiseMin(brightest).cwiseMax(0), width * wo.z(), 0});
-      area += samples.back().weight;
-      light += samples.back().weight * samples.back().target.sum();
+// One of `every_view` views, and of its lights one of `every_light`.
+Views thin_out(const Target& target, std::size_t every_view, std::size_t every_light) {
+  Views views;
+  const std::size_t first_view = std::min(every_view, target.size()) / 2;
+  for (std::size_t v = first_view; v < target.size(); v += every_view) {
+    const TargetView& from = target[v];
+    View view{from.wo.z(), {}};
+    for (std::size_t i = 0; i < from.lights.size(); i += every_light) {
+      const TargetLight& light = from.lights[i];
+      view.samples.push_back(
+          {facet_geometry(light.wi, from.wo), light.reflected, light.weight, light.typical});
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+// The sum of an amount over all samples, given what the sockets reflect there.
+template <typename Amount>
+double sum_over(const Views& views, const Vector& x, Amount&& amount) {
+  const SharedSockets<double> shared = {x[metallic], std::exp(x[log_roughness]), x[root],
+                                        x.segment<3>(tint).maxCoeff()};
+  double sum = 0;
+  for (const View& view : views) {
+    const auto at_view = principled_at_view(shared, view.n_wo);
+    for (const Sample& sample : view.samples) {
+      const auto light = principled_at_light(shared, at_view, sample.at);
+      Rgb reflected;
+      for (int c = 0; c < 3; ++c) {
+        reflected[c] = principled_channel(light, x[base + c], x[tint + c]);
+      }
+      sum += amount(sample, reflected);
     }
   }
-  if (!(light > darkest * area)) return {};
-  for (Sample& sample : samples) {
-    sample.weight /= light;
-    sample.typical = light / (3 * area);
-  }
-  return samples;
-}
-
-// Spheres of 20 light angles; the weights add up so that black has the error 1.
-Samples sample_target(const Reflectance& target) {
-  constexpr int spheres = 20;
-  Samples all;
-  int used = 0;
-  for (int sphere = 0; sphere < spheres; ++sphere) {
-    const Samples samples = sample_sphere(target, radians(85.0 * (sphere + 0.5) / spheres));
-    all.insert(all.end(), samples.begin(), samples.end());
-    used += !samples.empty();
-  }
-  for (Sample& sample : all) sample.weight /= used;
-  return all;
-}
-
-Rgb reflect(const Vector& x, const FacetGeometry& at) {
-  std::array<double, unknowns> values;
-  Eigen::Map<Vector>(values.data()) = x;
-  return Rgb(principled_terms(sockets_of(values), at).data());
-}
-
-// The relative L1 distance to the samples.
-double error_of(const Samples& samples, const Vector& x) {
-  double sum = 0;
-  for (const Sample& sample : samples) {
-    sum += sample.weight * (reflect(x, sample.at) - sample.target).abs().sum();
-  }
   return sum;
+}
+
+// The distance to the target by error_of, up to a factor where views or lights are left out.
+double error_of(const Views& views, const Vector& x) {
+  return sum_over(views, x, [](const Sample& sample, const Rgb& reflected) {
+    return sample.weight * (reflected - sample.target).abs().sum();
+  });
 }
 
 // The same with |r| made smooth as sqrt(r^2 + e^2) - e, e = smoothing x typical.
-double smooth_error(const Samples& samples, const Vector& x, double smoothing) {
-  double sum = 0;
-  for (const Sample& sample : samples) {
+double smooth_error(const Views& views, const Vector& x, double smoothing) {
+  return sum_over(views, x, [smoothing](const Sample& sample, const Rgb& reflected) {
     const double e = smoothing * sample.typical;
-    const Rgb r = (reflect(x, sample.at) - sample.target) / e;
-    // r^2 / (sqrt(r^2 + 1) + 1) keeps its digits where r is small.
-    sum += sample.weight * e * (r.square() / ((r.square() + 1).sqrt() + 1)).sum();
-  }
-  return sum;
+    const Rgb r2 = (reflected - sample.target).square();
+    // r^2 / (sqrt(r^2 + e^2) + e) keeps its digits where r is small.
+    return sample.weight * (r2 / ((r2 + e * e).sqrt() + e)).sum();
+  });
 }
 
 // Gradient of smooth_error and the matrix of its iteratively reweighted least squares.
 struct NormalEquations {
-  Matrix matrix;
-  Vector gradient;
+  Matrix matrix = Matrix::Zero();
+  Vector gradient = Vector::Zero();
 };
 
-NormalEquations linearise(const Samples& samples, const Vector& x, double smoothing) {
-  std::array<Dual, unknowns> duals;
-  for (int i = 0; i < unknowns; ++i) duals[static_cast<std::size_t>(i)] = Dual(x[i], i);
-  const auto sockets = sockets_of(duals);
-  Eigen::Matrix<double, Dual::DIMENSION, Dual::DIMENSION> matrix;
-  Eigen::Matrix<double, Dual::DIMENSION, 1> gradient;
-  matrix.setZero();
-  gradient.setZero();
-  for (const Sample& sample : samples) {
-    const auto values = principled_terms(sockets, sample.at);
-    for (int c = 0; c < 3; ++c) {
-      const Dual& value = values[static_cast<std::size_t>(c)];
-      const double r = value.a - sample.target[c];
-      const double weight =
-          sample.weight / std::sqrt(square(r) + square(smoothing * sample.typical));
-      matrix.noalias() += (weight * value.v) * value.v.transpose();
-      gradient += (weight * r) * value.v;
+NormalEquations linearise(const Views& views, const Vector& x, double smoothing) {
+  using std::exp;
+  const int brightest = brightest_tint(x);
+  const SharedSockets<Dual> shared = {Dual(x[metallic], 0), exp(Dual(x[log_roughness], 1)),
+                                      Dual(x[root], 2), Dual(x[tint + brightest], 3)};
+  std::array<Dual, 3> bases, tints;
+  std::array<Eigen::Matrix<double, own_unknowns, own_unknowns>, 3> matrices;
+  std::array<Eigen::Matrix<double, own_unknowns, 1>, 3> gradients;
+  for (int c = 0; c < 3; ++c) {
+    const auto channel = static_cast<std::size_t>(c);
+    bases[channel] = Dual(x[base + c], 4);
+    tints[channel] = Dual(x[tint + c], 5);
+    matrices[channel].setZero();
+    gradients[channel].setZero();
+  }
+  for (const View& view : views) {
+    const auto at_view = principled_at_view(shared, view.n_wo);
+    for (const Sample& sample : view.samples) {
+      const auto light = principled_at_light(shared, at_view, sample.at);
+      const double e = smoothing * sample.typical;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Dual value = principled_channel(light, bases[c], tints[c]);
+        const double r = value.a - sample.target[static_cast<Eigen::Index>(c)];
+        const double weight = sample.weight / std::sqrt(r * r + e * e);
+        matrices[c].noalias() += (weight * value.v) * value.v.transpose();
+        gradients[c] += (weight * r) * value.v;
+      }
     }
   }
-  return {matrix.topLeftCorner<unknowns, unknowns>(), gradient.head<unknowns>()};
+  NormalEquations equations;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const OwnUnknowns own = own_unknowns_of(static_cast<int>(c), brightest);
+    for (int j = 0; j < own_unknowns; ++j) {
+      const int column = own[static_cast<std::size_t>(j)];
+      equations.gradient[column] += gradients[c][j];
+      for (int i = 0; i < own_unknowns; ++i) {
+        equations.matrix(own[static_cast<std::size_t>(i)], column) += matrices[c](i, j);
+      }
+    }
+  }
+  return equations;
 }
 
 // A damped step, within the bounds. An unknown at its bound stays there while the error falls
@@ -181,14 +193,14 @@ Vector step_from(const Vector& x, const NormalEquations& equations, double dampi
 }
 
 // Levenberg and Marquardt's method on smooth_error.
-Vector descend(const Samples& samples, Vector x, double smoothing, int iterations) {
-  double error = smooth_error(samples, x, smoothing), damping = 1e-2;
+Vector descend(const Views& views, Vector x, double smoothing, int iterations) {
+  double error = smooth_error(views, x, smoothing), damping = 1e-2;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const NormalEquations equations = linearise(samples, x, smoothing);
+    const NormalEquations equations = linearise(views, x, smoothing);
     const double before = error;
     for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
       const Vector tried = step_from(x, equations, damping);
-      const double tried_error = smooth_error(samples, tried, smoothing);
+      const double tried_error = smooth_error(views, tried, smoothing);
       const bool better = tried_error < error;
       if (better) {
         x = tried;
@@ -202,12 +214,14 @@ Vector descend(const Samples& samples, Vector x, double smoothing, int iteration
 }
 
 // The median colour of the target away from its highlight, as the albedo of a diffuse surface.
-Rgb diffuse_albedo(const Samples& samples) {
+Rgb diffuse_albedo(const Views& views) {
   Rgb albedo;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> values;
-    for (const Sample& sample : samples) {
-      if (sample.at.cos2_h < 0.6) values.push_back(pi * sample.target[c] / sample.at.n_wi);
+    for (const View& view : views) {
+      for (const Sample& sample : view.samples) {
+        if (sample.at.cos2_h < 0.6) values.push_back(pi * sample.target[c] / sample.at.n_wi);
+      }
     }
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
@@ -216,24 +230,27 @@ Rgb diffuse_albedo(const Samples& samples) {
   return albedo;
 }
 
-// Where the search begins: from sharp to rough a dielectric over a diffuse surface, a metal, both
-// in equal parts, and a coat so dense that its tint is the colour of a highlight that pales at
-// grazing angles. The colours return the target's light.
-std::vector<Vector> starts(const Samples& samples) {
-  const Rgb albedo = diffuse_albedo(samples);
+// Where the search begins, 32 points: from sharp to rough a dielectric over a diffuse surface, a
+// metal, both in equal parts, and a coat so dense that its tint is the colour of a highlight that
+// pales at grazing angles. The colours return the target's light.
+std::vector<Vector> starts(const Views& views) {
+  const Rgb albedo = diffuse_albedo(views);
   std::vector<Vector> all;
-  for (const double roughness : {0.05, 0.12, 0.3, 0.7}) {
-    const auto start = [&](const Rgb& base, const Rgb& tint, double metallic, double root) {
+  for (const double roughness : {0.04, 0.07, 0.12, 0.2, 0.3, 0.45, 0.65, 0.9}) {
+    const auto start = [&](const Rgb& base_color, const Rgb& specular_tint, double metal,
+                           double reflectance_root) {
       Vector x;
-      x << base.matrix(), tint.matrix(), metallic, std::log(roughness), root;
+      x << base_color.matrix(), specular_tint.matrix(), metal, std::log(roughness),
+          reflectance_root;
       return x;
     };
     const Vector white = start(Rgb::Ones(), Rgb::Ones(), 1, 0.2);
     Rgb wanted = Rgb::Zero(), given = Rgb::Zero();
-    for (const Sample& sample : samples) {
+    sum_over(views, white, [&](const Sample& sample, const Rgb& reflected) {
       wanted += sample.weight * sample.target;
-      given += sample.weight * reflect(white, sample.at);
-    }
+      given += sample.weight * reflected;
+      return 0.0;
+    });
     const Rgb metal = (wanted / given).cwiseMin(1);
     all.push_back(start(albedo, Rgb::Ones(), 0, 0.2));
     all.push_back(start(metal, Rgb::Constant(0.8), 1, 0.2));
@@ -243,37 +260,46 @@ std::vector<Vector> starts(const Samples& samples) {
   return all;
 }
 
+struct Candidate {
+  Vector x;
+  double error;
+};
+
 }  // namespace
 
-Principled fit_principled(const Reflectance& target) {
-  const Samples samples = sample_target(target);
-  if (samples.empty()) return {};
-  // Every start is followed a little way on a part of the samples, the nearest few further, and the
-  // nearest to its end on all of them.
-  Samples few;
-  for (std::size_t i = 0; i < samples.size(); i += 5) few.push_back(samples[i]);
-  std::vector<std::pair<double, Vector>> found;
-  for (const Vector& start : starts(few)) found.emplace_back(0, start);
-  const auto follow = [&](double smoothing, int iterations) {
-    for (auto& [error, x] : found) {
-      x = descend(few, x, smoothing, iterations);
-      error = error_of(few, x);
-    }
-    std::sort(found.begin(), found.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
+Principled fit_principled(const Target& target, int threads) {
+  if (target.empty()) return {};
+  const Views few = thin_out(target, 4, 3), some = thin_out(target, 4, 1),
+              all = thin_out(target, 1, 1);
+  std::vector<Candidate> found;
+  for (const Vector& start : starts(few)) found.push_back({start, 0});
+  // Follows every candidate and keeps the best few.
+  const auto follow = [&](const Views& views, double smoothing, int iterations, std::size_t kept) {
+    parallel_for(static_cast<int>(found.size()), thread_count(threads), [&](int i) {
+      Candidate& candidate = found[static_cast<std::size_t>(i)];
+      candidate.x = descend(views, candidate.x, smoothing, iterations);
+      candidate.error = error_of(views, candidate.x);
+    });
+    std::stable_sort(found.begin(), found.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
+    found.resize(std::min(found.size(), kept), found.front());
   };
-  follow(0.1, 5);
-  found.resize(4);
-  follow(0.03, 10);
-  Vector best = found.front().second;
-  for (const double smoothing : {0.03, 0.003}) best = descend(samples, best, smoothing, 10);
+  follow(few, 0.1, 4, 8);
+  follow(few, 0.03, 8, 4);
+  follow(some, 0.03, 8, 2);
+  follow(all, 0.03, 3, 1);
+  follow(all, 0.01, 10, 1);
+  follow(all, 0.003, 10, 1);
+  const Vector& best = found.front().x;
   Principled result;
-  result.base_color = best.segment<3>(0).array();
-  result.specular_tint = best.segment<3>(3).array();
-  result.metallic = best[6];
-  result.roughness = std::exp(best[7]);
-  result.ior = (1 + best[8]) / (1 - best[8]);
-  result.error = error_of(samples, best);
+  result.base_color = best.segment<3>(base).array();
+  result.specular_tint = best.segment<3>(tint).array();
+  result.metallic = best[metallic];
+  result.roughness = std::exp(best[log_roughness]);
+  result.ior = (1 + best[root]) / (1 - best[root]);
+  result.error = error_of(target, [&](const Vector3& wi, const Vector3& wo) {
+    return evaluate_principled(result, wi, wo);
+  });
   return result;
 }
 

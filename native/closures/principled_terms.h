@@ -46,15 +46,15 @@ class CoatTable {
   std::array<float, nodes * nodes * nodes> values_;
 };
 
-// The sockets, in the form that is fitted: reflectance_root is (ior - 1) / (ior + 1), the square
-// root of F0.
+// The sockets that all channels share, in the form that is fitted: reflectance_root is
+// (ior - 1) / (ior + 1), the square root of F0. The largest channel of the specular tint is one of
+// them, since it dims the diffuse part of every channel.
 template <typename T>
-struct PrincipledSockets {
-  std::array<T, 3> base_color;
-  std::array<T, 3> specular_tint;
+struct SharedSockets {
   T metallic;
   T roughness;
   T reflectance_root;
+  T brightest_tint;
 };
 
 inline double value_of(double x) { return x; }
@@ -111,19 +111,24 @@ T CoatTable::operator()(const T& roughness, double n_wo, const T& root_ior) cons
   return mix(low, high, T(roughness * double(nodes - 1) - double(r)));
 }
 
-// D G / (4 n.wo) of GGX.
+// Masking of GGX, 1 + 2 Lambda, for a light or a viewer at the angle of `cosine` to the normal.
 template <typename T>
-T ggx_lobe(const T& roughness, const FacetGeometry& at) {
+T ggx_masking(const T& roughness, double cosine) {
+  using std::sqrt;
+  const double tangent2 = (1 - square(cosine)) / square(cosine);
+  return sqrt(1.0 + square(square(roughness)) * tangent2);
+}
+
+// D G / (4 n.wo) of GGX; view_masking is that of n.wo.
+template <typename T>
+T ggx_lobe(const T& roughness, const T& view_masking, const FacetGeometry& at) {
   const T alpha2 = square(square(roughness));
   // Cycles takes anything narrower for a mirror.
   if (value_of(alpha2) <= 2e-10) return T(0);
-  const auto masking = [&](double cosine) {
-    using std::sqrt;
-    return sqrt(1.0 + alpha2 * ((1 - square(cosine)) / square(cosine)));
-  };
   const T spread = at.sin2_h + alpha2 * at.cos2_h;
   // With Lambda = (masking - 1) / 2, G = 1 / (1 + Lambda_i + Lambda_o) = 2 / (sum of maskings).
-  return alpha2 / (square(spread) * (masking(at.n_wi) + masking(at.n_wo)) * (2 * pi * at.n_wo));
+  return alpha2 /
+         (square(spread) * (ggx_masking(roughness, at.n_wi) + view_masking) * (2 * pi * at.n_wo));
 }
 
 // Schlick's Fresnel term through base_color at normal incidence and base_color x tint, of what it
@@ -138,30 +143,53 @@ T metal_fresnel(const T& base_color, const T& tint, double cosine) {
       T(base_color + (1.0 - base_color) * opposite5 - dip * (cosine * opposite5 * opposite)));
 }
 
+// What all lights seen from one view angle share.
 template <typename T>
-std::array<T, 3> principled_terms(const PrincipledSockets<T>& sockets, const FacetGeometry& at) {
+struct PrincipledAtView {
+  T masking;
+  T diffuse;  // what is left of a white diffuse part, in 1/sr
+};
+
+template <typename T>
+PrincipledAtView<T> principled_at_view(const SharedSockets<T>& shared, double n_wo) {
   using std::sqrt;
-  const T& root = sockets.reflectance_root;
-  const T f0 = square(root);
-  const T schlick = schlick_weight(root, at.wi_h);
+  const T& root = shared.reflectance_root;
   // At ior = 1 there is no coat, and the root has no derivative.
   const T coat =
-      value_of(root) > 0 ? CoatTable::instance()(sockets.roughness, at.n_wo, T(sqrt(root))) : T(0);
-  const auto& tint = sockets.specular_tint;
-  const auto brightest = std::max_element(
-      tint.begin(), tint.end(), [](const T& a, const T& b) { return value_of(a) < value_of(b); });
-  const T coat_albedo = mix(T(f0 * *brightest), T(1), coat);
-  const T dielectric = 1.0 - sockets.metallic;
-  const T lobe = ggx_lobe(sockets.roughness, at);
-  const T diffuse = dielectric * saturate(T(1.0 - coat_albedo)) * (at.n_wi / pi);
-  std::array<T, 3> result;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const T& base = sockets.base_color[c];
-    const T reflected = sockets.metallic * metal_fresnel(base, tint[c], at.wi_h) +
-                        dielectric * mix(T(f0 * tint[c]), T(1), schlick);
-    result[c] = lobe * reflected + diffuse * base;
-  }
-  return result;
+      value_of(root) > 0 ? CoatTable::instance()(shared.roughness, n_wo, T(sqrt(root))) : T(0);
+  const T coat_albedo = mix(T(square(root) * shared.brightest_tint), T(1), coat);
+  return {ggx_masking(shared.roughness, n_wo),
+          (1.0 - shared.metallic) * saturate(T(1.0 - coat_albedo)) / pi};
+}
+
+// What all channels share at one light.
+template <typename T>
+struct PrincipledAtLight {
+  T metal;       // the lobe's part that a metal reflects by its colours
+  T dielectric;  // the part that a dielectric reflects by its tint
+  T untinted;    // and the part that no socket colours
+  T diffuse;     // what a white diffuse part reflects
+  double wi_h;
+};
+
+template <typename T>
+PrincipledAtLight<T> principled_at_light(const SharedSockets<T>& shared,
+                                         const PrincipledAtView<T>& view, const FacetGeometry& at) {
+  const T& root = shared.reflectance_root;
+  const T schlick = schlick_weight(root, at.wi_h);
+  const T lobe = ggx_lobe(shared.roughness, view.masking, at);
+  const T metal = shared.metallic * lobe;
+  const T dielectric = lobe - metal;
+  const T untinted = dielectric * schlick;
+  return {metal, square(root) * (dielectric - untinted), untinted, view.diffuse * at.n_wi, at.wi_h};
+}
+
+// f cos of a channel.
+template <typename T>
+T principled_channel(const PrincipledAtLight<T>& light, const T& base_color,
+                     const T& specular_tint) {
+  return light.metal * metal_fresnel(base_color, specular_tint, light.wi_h) +
+         light.dielectric * specular_tint + light.untinted + light.diffuse * base_color;
 }
 
 }  // namespace lobefit
