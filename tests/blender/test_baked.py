@@ -105,14 +105,27 @@ def connect_normal(material, socket):
     material.node_tree.links.new(socket, group_node(material).inputs["Normal"])
 
 
+def bend_normal(material, offset):
+    """Connects the surface's normal plus an offset."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    # Not of unit length, as what a user connects may be.
+    bent = nodes.new("ShaderNodeVectorMath")
+    bent.inputs[1].default_value = offset
+    links.new(nodes.new("ShaderNodeNewGeometry").outputs["Normal"], bent.inputs[0])
+    connect_normal(material, bent.outputs[0])
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
 def brightest(closures, light, rng):
     """256 normals, half of them where the closures are brightest, the others anywhere."""
     half = (light + UP) / np.linalg.norm(light + UP)
     cosine, azimuth = rng.uniform(0.1, 1, 20000), rng.uniform(0, 2 * np.pi, 20000)
     sine = np.sqrt(1 - cosine**2)
     anywhere = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
-    near = half + rng.normal(0, 0.2, anywhere.shape)
-    near /= np.linalg.norm(near, axis=1, keepdims=True)
+    near = unit(half + rng.normal(0, 0.2, anywhere.shape))
     near = near[near[:, 2] > 0.1]
     order = np.argsort(seen(closures, near, light).sum(1))
     return np.concatenate([near[order[-128:]], anywhere[:128]])
@@ -123,9 +136,10 @@ SHAPES = list(
 )
 
 
-# Least roughness and how far off a pixel may be, as a part of the peak: single precision. A lobe of
-# alpha 0.01, and 0.002 across, turns the last digits of a normal into thousandths.
-PRECISION = ((0.1, 5e-3), (0.3, 1e-4), (0.6, 1e-5), (1.0, 1e-5))
+# Roughness and how far off a pixel may be, as a part of the peak: single precision. Cycles finds
+# how far the half vector is off the normal in the last digits of a cosine near 1, so that a lobe
+# with the roughness 0.1, which is 0.01 wide, is off by 0.9 %; twice what was found is allowed.
+PRECISION = ((0.1, 2e-2), (0.3, 3e-4), (0.6, 2e-5), (1.0, 1e-5))
 
 
 @pytest.mark.parametrize("phase", PHASES)
@@ -143,10 +157,7 @@ def test_every_shape_is_the_formula(build, tmp_path, phase):
     for k, shape in enumerate(SHAPES):
         expected = seen(entries[k], normals[k], light)
         difference = np.abs(rendered[256 * k : 256 * (k + 1)] - expected).max()
-        print("SHAPE", phase, difference / max(expected.max(), 1e-30), expected.max(), shape)
-        d = np.abs(rendered[256 * k : 256 * (k + 1)] - expected).max(1)
-        i = d.argsort()[::-1][:4]
-        print("WORST", d[i] / max(expected.max(), 1e-30), normals[k][i, 2] * 256, expected[i[0]])
+        assert difference <= dict(PRECISION)[shape[1]] * expected.max(), shape
 
 
 @pytest.mark.parametrize("phase", PHASES)
@@ -156,7 +167,6 @@ def test_a_sum_of_closures_is_the_formula(build, render, phase):
     )
     expected = seen(closures, sphere_normals(), light_at(phase))
     difference = np.abs(render(build(closures), light_at(phase)) - expected)
-    print("SUM", phase, difference.max() / expected.max())
     assert difference.max() < 1e-5 * expected.max()
 
 
@@ -164,9 +174,8 @@ def test_a_sum_of_closures_is_the_formula(build, render, phase):
 def test_a_fitted_material_is_the_formula(build, render, nickel, phase):
     expected = seen(nickel.closures[0], sphere_normals(), light_at(phase))
     difference = np.abs(render(build(), light_at(phase)) - expected)
-    print("NICKEL", phase, difference.max() / expected.max())
-    # Cycles leaves out a closure whose weight is below 1e-5.
-    assert difference.max() < 1e-4 * expected.max()
+    # Single precision of a highlight that is 0.03 wide.
+    assert difference.max() < 3e-4 * expected.max()
 
 
 def test_an_unconnected_normal_is_the_normal_of_the_surface(build, render):
@@ -182,12 +191,7 @@ def test_a_connected_normal_is_used(build, render, nickel):
     # Cycles dims a diffuse closure whose normal is not the surface's.
     closures = nickel.closures[0] | {"diffuse": BLACK}
     material, light = build(closures), light_at(30)
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    # Not of unit length, as what a user connects may be.
-    bent = nodes.new("ShaderNodeVectorMath")
-    bent.inputs[1].default_value = (0.4, 0.0, 0.0)
-    links.new(nodes.new("ShaderNodeNewGeometry").outputs["Normal"], bent.inputs[0])
-    connect_normal(material, bent.outputs[0])
+    bend_normal(material, (0.4, 0.0, 0.0))
     flat = np.tile(UP, (SIZE * SIZE, 1))
     normal = np.array([0.4, 0.0, 1.0]) / np.hypot(0.4, 1.0)
     expected = seen(closures, np.tile(normal, (SIZE * SIZE, 1)), light)
@@ -199,7 +203,6 @@ def test_turning_everything_changes_nothing(build, render):
     turn = Matrix.Rotation(1.1, 4, Vector((0.2, 0.5, -0.7)))
     plain = render(material, light_at(75))
     difference = np.abs(render(material, light_at(75), turn=turn) - plain)
-    print("TURN", difference.max() / plain.max())
     # Single precision of a turned position moves a normal by about 1e-6, a 30000th of this width.
     assert difference.max() < 5e-4 * plain.max()
 
@@ -240,7 +243,6 @@ def test_a_facing_disc_does_not_swirl(build, render, nickel, distribution, light
     assert np.abs(rendered / expected - 1).max() < 1e-3
     if light[2] == 1:
         rings = rendered.reshape(SIZE, SIZE, 3)
-        print("DISC", (np.ptp(rings, axis=1) / rings.mean(1)).max())
         assert (np.ptp(rings, axis=1) / rings.mean(1)).max() < 1e-3
 
 
@@ -262,8 +264,10 @@ def relative_l1(picture, expected, where):
     return np.abs(picture - expected)[where].sum() / expected[where].sum()
 
 
-@pytest.mark.parametrize("phase", PHASES)
-def test_a_smooth_sphere_is_the_formula(build, tmp_path, nickel, phase):
+# What the mesh's own normals, interpolated between vertices, are off: a highlight that all but
+# grazes is seen through them. Below, with the normals that Cycles tells, 1e-4 is left.
+@pytest.mark.parametrize(("phase", "bound"), [(8, 0.02), (47, 0.02), (101, 0.035)])
+def test_a_smooth_sphere_is_the_formula(build, tmp_path, nickel, phase, bound):
     scene = new_scene(SIZE)
     add(scene, smooth_sphere(build()))
     add_camera(scene, Matrix.Translation((0, 0, 9)), width=2.0)
@@ -272,8 +276,7 @@ def test_a_smooth_sphere_is_the_formula(build, tmp_path, nickel, phase):
     expected = seen(nickel.closures[0], normals, light_at(phase))
     # Away from the silhouette: the mesh is smaller than the sphere.
     where = (normals[:, 2] > 0.25) & (normals[:, 2] < 1)
-    print("SMOOTH", phase, relative_l1(pixels_of(scene, tmp_path), expected, where))
-    assert relative_l1(pixels_of(scene, tmp_path), expected, where) < 0.02
+    assert relative_l1(pixels_of(scene, tmp_path), expected, where) < bound
 
 
 @pytest.mark.parametrize("phase", (8, 47, 80))
@@ -298,8 +301,8 @@ def test_a_normal_map_bends_the_closures(build, render, tmp_path, nickel, phase)
     # Cycles bends a normal back whose mirror direction, twice as far, is below the surface.
     where = (normals[:, 2] > np.cos(np.radians(40))) & (normals[:, 2] < 1)
     expected = seen(closures, normals, light_at(phase))
-    print("MAP", phase, relative_l1(rendered, expected, where))
-    assert relative_l1(rendered, expected, where) < 0.02
+    # Single precision; the bound of a picture anyone could tell apart would be 0.02.
+    assert relative_l1(rendered, expected, where) < 1e-3
 
 
 def quadrature(cosine, rings=400, sectors=180):
@@ -345,8 +348,8 @@ def test_a_white_world_shows_the_albedo(addon, build, tmp_path, nickel, kind, an
     add_camera(scene, place, width=1.0)
     expected = albedo(closures, np.cos(np.radians(angle)))
     rendered = pixels_of(scene, tmp_path).mean(0)
-    print("ALBEDO", kind, angle, rendered / expected - 1)
-    # 64 samples a pixel: the mean of all has a noise of 0.2 %.
+    # Noise is below 1e-4 with 64 samples a pixel; but Cycles does not sample a Beckmann closure
+    # quite as it evaluates it, which is up to 0.7 %.
     assert np.allclose(rendered, expected, rtol=0.01)
 
 
@@ -357,13 +360,12 @@ class Crowd:
         rng = np.random.default_rng(seed)
 
         def near(normals, spread):
-            turned = normals + spread * rng.normal(0, 1, normals.shape)
-            return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+            return unit(normals + spread * rng.normal(0, 1, normals.shape))
 
         count = size**2
         self.flat = near(np.tile(UP, (count, 1)), 3.0)
         self.flat[:, 2] = np.maximum(np.abs(self.flat[:, 2]), 0.02)
-        self.flat /= np.linalg.norm(self.flat, axis=1, keepdims=True)
+        self.flat = unit(self.flat)
         self.smooth, self.bent = near(self.flat, 0.5), near(self.flat, 0.5)
         # Some are not bent, and some face the viewer exactly.
         self.bent[::5] = self.smooth[::5]
@@ -385,7 +387,8 @@ class Crowd:
     def faults(self, folder, light):
         """How many pixels are not finite or negative, and how many are black without a reason."""
         rendered = render_facets(folder, self.mesh, light)
-        lit = np.ones(len(rendered), bool)
+        # Cycles shows no diffuse closure whose normal is turned away from the smooth one.
+        lit = (self.smooth * self.bent).sum(1) > 0.1
         for normals in (self.flat, self.smooth, self.bent):
             lit &= (normals @ light > 0.1) & (normals[:, 2] > 0.01)
         wrong = ~np.isfinite(rendered).all(1) | (rendered < 0).any(1)
@@ -406,7 +409,6 @@ def crowd_entries(nickel):
 def test_nothing_is_black_or_infinite(build, tmp_path, nickel, phase):
     materials = [build(closures) for closures in crowd_entries(nickel)]
     wrong, black, lit = Crowd(materials, 200, phase).faults(tmp_path, light_at(phase))
-    print("CROWD", phase, wrong, black, lit)
     assert lit > 1000
     assert (wrong, black) == (0, 0)
 
@@ -444,36 +446,54 @@ def add_mirror(scene):
     add(scene, mesh)
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("phase", (8, 47, 101))
-def test_perspective_and_mirrors_show_the_formula(build, tmp_path, nickel, mirrored, phase):
+def sphere_scene(mesh, light, mirrored):
+    """A picture of a sphere in perspective, or of its image in a mirror alone."""
     scene = new_scene(SIZE)
     scene.cycles.max_bounces = 1
-    mesh = smooth_sphere(build())
     add(scene, mesh)
-    light = light_at(phase)
+    add_sun(scene, light)
     if mirrored:
         add_mirror(scene)
-        light = light * [1, 1, -1]
-    add_sun(scene, light)
-    eye, centre = Vector((1.5, 0.5, 2.5)), Vector((0, 0, -8 if mirrored else 0))
+    eye, centre = Vector((3.0, 0.5, 2.5)), Vector((0, 0, -8 if mirrored else 0))
     place = (eye - centre).to_track_quat("Z", "Y").to_matrix().to_4x4()
     add_camera(scene, Matrix.Translation(eye) @ place)
     scene.camera.data.angle = 2.2 / (eye - centre).length
+    return scene
+
+
+@pytest.mark.parametrize("bent", [False, True])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("phase", (8, 47, 101))
+def test_a_smooth_sphere_in_perspective_is_the_formula(
+    build, tmp_path, nickel, bent, mirrored, phase
+):
+    offset = np.array([0.1, 0.2, 0.0]) * bent
+    # Cycles dims a diffuse closure whose normal is not the surface's.
+    closures = nickel.closures[0] | ({"diffuse": BLACK} if bent else {})
+    material = build(closures)
+    if bent:
+        bend_normal(material, offset)
+    mesh = smooth_sphere(material)
+    light = light_at(phase) * [1, 1, -1 if mirrored else 1]
+    scene = sphere_scene(mesh, light, mirrored)
     rendered = pixels_of(scene, tmp_path)
     # What each pixel sees, as Cycles tells it.
     pictures = []
     for name in ("Normal", "Incoming"):
         mesh.materials[0] = shows(name)
         pictures.append(pixels_of(scene, tmp_path))
-    normals, viewers = (2 * picture - 1 for picture in pictures)
     hit = pictures[0].any(1)
-    assert hit.mean() > 0.5
-    where = hit & ((normals * viewers).sum(1) > 0.25)
-    normals, viewers = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (normals, viewers))
-    expected = seen(nickel.closures[0], normals, light, viewers)
-    print("PERSP", mirrored, phase, relative_l1(rendered, expected, where), where.mean())
-    assert relative_l1(rendered, expected, where) < 0.01
+    surface, viewers = (unit(2 * picture - 1) for picture in pictures)
+    normals = unit(surface + offset)
+    # Away from the silhouette, and where Cycles does not bend a normal back because its mirror
+    # direction is below the surface.
+    facing = (normals * viewers).sum(1)
+    mirror = 2 * facing[:, None] * normals - viewers
+    where = hit & (facing > 0.25) & ((mirror * surface).sum(1) > 0.1) & (surface @ light > 0)
+    assert where.sum() > 50
+    expected = seen(closures, normals, light, viewers)
+    # Single precision, 6e-5 at most; a hundredth would be seen.
+    assert relative_l1(rendered, expected, where) < 1e-3
 
 
 def test_everything_but_cycles_shows_the_principled_bsdf(build, nickel):
@@ -487,7 +507,7 @@ def test_everything_but_cycles_shows_the_principled_bsdf(build, nickel):
         assert stored == pytest.approx(nickel.principled[key], rel=1e-6)
     colour = principled.inputs["Base Color"].default_value[:3]
     assert list(colour) == pytest.approx(nickel.principled["base_color"], rel=1e-6)
-    assert outputs["CYCLES"].inputs["Surface"].links[0].from_node == group_node(build())
+    assert outputs["CYCLES"].inputs["Surface"].links[0].from_node.type == "GROUP"
 
 
 def described(tree):
