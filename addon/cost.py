@@ -69,11 +69,13 @@ def measure_costs(
 
     Setting up a render is counted too; at 32 samples it is some 3 % of a diffuse material's time.
     """
+    before = bpy.context.scene
     scene, item = _scene(lights)
     times: dict[Name, list[float]] = {name: [] for name in materials}
     for _, (name, material) in itertools.product(range(rounds), materials.items()):
         item.data.materials[0] = material
         times[name].append(_seconds(scene, samples) / (_SIZE * _SIZE * samples))
+    bpy.context.window.scene = before
     _remove(scene)
     return {name: Cost(min(each), statistics.median(each)) for name, each in times.items()}
 
@@ -134,14 +136,23 @@ def _scene(lights: str) -> tuple[bpy.types.Scene, bpy.types.Object]:
         sun.energy, sun.angle = 1.0, 0.0
         _add(scene, sun).rotation_euler = Vector(_SUN).to_track_quat("Z", "Y").to_euler()
     elif lights == "world":
-        scene.world = bpy.data.worlds.new("Cost")
-        scene.world.color = (1.0, 1.0, 1.0)
+        scene.world = _white_world()
     else:
         lamp = bpy.data.lights.new("Cost", "AREA")
         lamp.energy, lamp.size = 100.0, 1.0
         _add(scene, lamp).location = (0.0, 0.0, 2.9)
     _set_up_cycles(scene, _BOUNCES[lights])
     return scene, item
+
+
+def _white_world() -> bpy.types.World:
+    world = bpy.data.worlds.new("Cost")
+    tree = empty_shader_tree(world)
+    background = tree.nodes.new("ShaderNodeBackground")
+    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    output = tree.nodes.new("ShaderNodeOutputWorld")
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    return world
 
 
 def _mesh(walls: bool) -> bpy.types.Mesh:
@@ -181,4 +192,5 @@ def _remove(scene: bpy.types.Scene) -> None:
     """Takes away the scene with all that `_scene` made for it."""
     world = [scene.world] if scene.world else []
     made = [item.data for item in scene.objects] + list(scene.objects) + world
-    bpy.data.batch_remove([scene, *made])
+    bpy.data.scenes.remove(scene)
+    bpy.data.batch_remove(made)

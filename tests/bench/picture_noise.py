@@ -18,11 +18,12 @@ from lobefit.blender import quiet
 from lobefit.inputs import record_of
 from lobefit.record import VISUAL_NORM
 from lobefit_addon import build_material
+from lobefit_addon.nodes.tree import empty_shader_tree
 from lobefit_addon.scene import two_lights_scene
 from mathutils import Vector
 from numpy.typing import NDArray
 
-SIZE = 64
+SIZE = 48
 NOISY, RENDERS = 16, 24  # samples of a picture whose variance is taken, and how many of them
 DENOISED, REFERENCE = 64, 4096
 LIMIT = 1.2
@@ -33,10 +34,8 @@ LAMPS = [((1, 1, 1.2), 0.999, 400.0), ((-1, -0.3, 0.4), 0.996, 60.0), ((-0.4, 1,
 def sky() -> bpy.types.World:
     """A gradient from the ground to the zenith (+y in the picture), with bright discs in it."""
     world = bpy.data.worlds.new("Sky")
-    if world.node_tree is None:
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    nodes.clear()
+    tree = empty_shader_tree(world)
+    nodes, links = tree.nodes, tree.links
     direction = nodes.new("ShaderNodeNewGeometry").outputs["Incoming"]
 
     def math(operation: str, *operands: object) -> bpy.types.NodeSocket:

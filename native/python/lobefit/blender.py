@@ -75,7 +75,7 @@ def costs(record: Record) -> dict[tuple[str, int | None], float]:
         materials = {("diffuse", None): diffuse_material()}
         for kind, count in ways:
             materials[kind, count] = build_material(record, kind=kind, count=count)
-        measured = measure_costs(materials, "world", rounds=7, samples=16)
+        measured = measure_costs(materials, "world", rounds=5, samples=16)
     return {way: cost.seconds for way, cost in measured.items()}
 
 
