@@ -209,10 +209,10 @@ class NodeFormulas:
         return len(heights)
 
 
-def empty_shader_tree(material: bpy.types.Material) -> bpy.types.NodeTree:
-    """The material's node tree, with no node in it."""
-    if material.node_tree is None:
-        # Materials have a tree from the start since Blender 5.0, where this property is deprecated.
-        material.use_nodes = True
-    material.node_tree.nodes.clear()
-    return material.node_tree
+def empty_shader_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
+    """The node tree of a material or a world, with no node in it."""
+    if owner.node_tree is None:
+        # Both have a tree from the start since Blender 5.0, where this property is deprecated.
+        owner.use_nodes = True
+    owner.node_tree.nodes.clear()
+    return owner.node_tree

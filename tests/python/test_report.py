@@ -5,7 +5,10 @@ import io
 import re
 from html.parser import HTMLParser
 
-from lobefit import report
+import numpy as np
+import pytest
+from lobefit import _native, pictures, read, report
+from lobefit.pictures import Picture
 from lobefit.plot import Line, plot
 
 
@@ -56,3 +59,58 @@ def test_a_plot_parts_its_line_where_nothing_is_known():
 
 def test_a_plot_of_nothing_is_empty():
     assert plot([Line("one", [0, 1], [None, None], "#000")], "x", "y") == ""
+
+
+WAYS = [
+    Picture("diffuse", None, None, 8e-7),
+    Picture("principled", None, 0.2, 1.2e-6),
+    Picture("measured", 1, 0.1, 1.1e-6),
+    Picture("measured", 2, 0.05, 1.4e-6),
+]
+
+
+def test_pictures_are_plotted_by_error_and_cost(record, tmp_path):
+    report.write(tmp_path, [record], ways={record.name: WAYS})
+    page = (tmp_path / "index.html").read_text()
+    assert 'aria-label="sphere error over ns a sample"' in page
+    assert "measured 2: 0.05" in page and "was not measured" not in page
+    lines = list(csv.DictReader((tmp_path / "pictures.csv").open()))
+    assert [(line["kind"], line["closures"]) for line in lines] == [
+        ("diffuse", ""),
+        ("principled", ""),
+        ("measured", "1"),
+        ("measured", "2"),
+    ]
+    assert float(lines[3]["sphere_error"]) == 0.05
+    assert float(lines[2]["principled_costs"]) == pytest.approx(1.1 / 1.2)
+
+
+def test_without_blender_the_page_says_that_no_cost_was_measured(record, tmp_path):
+    report.write(tmp_path, [record])
+    page = (tmp_path / "index.html").read_text()
+    assert page.count("was not measured") == 1 and "sphere error over" not in page
+    assert not (tmp_path / "pictures.csv").exists()
+
+
+def test_every_kind_is_measured(all_models):
+    pytest.importorskip("bpy", reason="bpy is absent")
+    record = pictures.with_closures(all_models[0])
+    ways = pictures.measure(record)
+    found = {(way.kind, way.count) for way in ways}
+    others = {(kind, None) for kind in ("diffuse", "principled", "live")}
+    assert found == others | set(pictures.COMPARED)
+    assert all(way.seconds > 0 for way in ways)
+    assert all((way.error is None) == (way.kind == pictures.FLOOR) for way in ways)
+
+
+def test_closures_of_a_lost_measurement_are_not_asked_for(record):
+    assert pictures.with_closures(record) is record
+
+
+def test_a_sphere_error_is_a_part_of_the_light(table, truth):
+    measurement = read(table)
+    assert pictures.sphere_error(measurement, lambda wi, wo: np.zeros_like(wi)) == pytest.approx(1)
+    own = pictures.sphere_error(
+        measurement, lambda wi, wo: _native.evaluate_model(truth, wi, wo) * wi[:, 2:]
+    )
+    assert own < 0.01

@@ -17,10 +17,17 @@ from lobefit.record import Record
 
 KINDS = ("measured", "lobe", "live", "principled", "auto")
 
+_MODULES = ("bpy", "lobefit_addon")
+
+
+def has_blender() -> bool:
+    """Whether Blender's Python module and the add-on are there."""
+    return all(importlib.util.find_spec(module) for module in _MODULES)
+
 
 def need_blender() -> None:
     """Raises InputError, with what to install, where Blender's Python module is missing."""
-    for module in ("bpy", "lobefit_addon"):
+    for module in _MODULES:
         if importlib.util.find_spec(module) is None:
             raise InputError(
                 f"expected the Python module {module} to make a material, found none; install it "
@@ -50,9 +57,31 @@ def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]
     from lobefit_addon.scene import render_pixels
 
     scene = _two_lights_scene([record], size, kind)
-    with _quiet():
+    with quiet():
         pixels: NDArray[np.float32] = render_pixels(scene)
     return pixels
+
+
+def costs(record: Record) -> dict[tuple[str, int | None], float]:
+    """Processor seconds a camera sample of every kind of material of a record, by kind and count.
+
+    Both are those of `lobefit_addon.build_material`; the count is None where a kind has no choice
+    of it. ("diffuse", None) is a plain diffuse surface. Measured under a constant world, which lets
+    Cycles both evaluate and sample each closure.
+    """
+    import bpy
+    from lobefit_addon import build_material
+    from lobefit_addon.cost import diffuse_material, measure_costs
+
+    ways = [("live", None), ("principled", None)]
+    ways += [(entry["target"], entry["count"]) for entry in record.closures if entry["count"]]
+    with quiet():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        materials = {("diffuse", None): diffuse_material()}
+        for kind, count in ways:
+            materials[kind, count] = build_material(record, kind=kind, count=count)
+        measured = measure_costs(materials, "world", rounds=5, samples=16)
+    return {way: cost.seconds for way, cost in measured.items()}
 
 
 def _two_lights_scene(records: list[Record], size: int, kind: str, **options: Any) -> Any:
@@ -61,7 +90,7 @@ def _two_lights_scene(records: list[Record], size: int, kind: str, **options: An
     from lobefit_addon import build_material
     from lobefit_addon.scene import two_lights_scene
 
-    with _quiet():
+    with quiet():
         bpy.ops.wm.read_factory_settings(use_empty=True)
         materials = [build_material(record, kind, record.name, **options) for record in records]
         for material in materials:
@@ -72,7 +101,7 @@ def _two_lights_scene(records: list[Record], size: int, kind: str, **options: An
 def _save(path: str | os.PathLike[str]) -> None:
     import bpy
 
-    with written_aside(path) as aside, _quiet():
+    with written_aside(path) as aside, quiet():
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(aside.absolute()), copy=True, compress=True)
         except RuntimeError as error:
@@ -80,7 +109,7 @@ def _save(path: str | os.PathLike[str]) -> None:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keeps what Blender itself prints out of our results on stdout."""
     sys.stdout.flush()
     ours = os.dup(1)

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from lobefit import _native, blender, picture, preview, report
+from lobefit import _native, blender, picture, pictures, preview, report
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
@@ -390,6 +390,10 @@ def _report(options: argparse.Namespace) -> int:
     records: list[Record] = []
     code = _records(options, records)
     if records:
-        report.write(options.output, records)
+        ways = {}
+        if blender.has_blender():
+            records = [pictures.with_closures(record) for record in records]
+            ways = {record.name: pictures.measure(record) for record in records}
+        report.write(options.output, records, ways=ways)
         print(Path(options.output) / "index.html")
     return code

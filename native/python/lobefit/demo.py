@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from lobefit import blender, picture, preview, report
+from lobefit import blender, picture, pictures, preview, report
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder
 from lobefit.command_line import DONE, INTERRUPTED, SOME_FAILED, WRONG, progress_bar
@@ -34,12 +34,15 @@ class _Demo:
     records: list[Record] = field(default_factory=list)
     rows: list[preview.Row] = field(default_factory=list)
     renderings: dict[str, report.Rendering] = field(default_factory=dict)
+    ways: dict[str, list[pictures.Picture]] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
 
     def add(self, path: Path) -> None:
         """One material, from its file to its picture."""
         with progress_bar(path.name) as progress:
             record = record_of(path, progress, model="all", norm=VISUAL_NORM, closures=[Closures()])
+        if self.has_blender:
+            record = pictures.with_closures(record)
         record.save(make_folder(self.folder / "records") / f"{path.stem}.json")
         self.records.append(record)
         if self.has_blender:
@@ -54,13 +57,14 @@ class _Demo:
         start = time.perf_counter()
         pixels = blender.render(record, preview.SPHERE * preview.FINER, KIND)
         self.renderings[record.name] = report.Rendering(pixels, time.perf_counter() - start)
+        self.ways[record.name] = pictures.measure(record)
         shown = picture.encode(picture.expose(pixels, picture.white_point(pixels)))
         picture.write_png(make_folder(self.folder / "pictures") / f"{name}.png", shown)
 
     def finish(self) -> None:
         """What is made of all materials together."""
         picture.write_png(self.folder / "materials.png", preview.sheet(self.rows))
-        report.write(self.folder, self.records, self.renderings, self.failures)
+        report.write(self.folder, self.records, self.renderings, self.failures, self.ways)
         built = [record for record in self.records if record.name in self.renderings]
         if built:
             blender.write_library(self.folder / "materials.blend", built, KIND)

@@ -19,6 +19,7 @@ class Line:
     color: str
     dashed: bool = False
     dots: Sequence[str] = ()  # what each point is, shown when it is pointed at
+    marks: Sequence[str] = ()  # a word or number beside each point
 
 
 def plot(lines: Sequence[Line], x_title: str, y_title: str) -> str:
@@ -74,7 +75,7 @@ class _Axes:
         return "".join(parts)
 
     def curve(self, line: Line) -> str:
-        path, pen_down, dots = [], False, []
+        path, pen_down, dots, marks = [], False, [], []
         for index, (x, y) in enumerate(zip(line.x, line.y, strict=True)):
             if y is None:
                 pen_down = False
@@ -87,8 +88,15 @@ class _Axes:
                     f'<circle cx="{at[0]:.1f}" cy="{at[1]:.1f}" r="3.5" fill="{line.color}">'
                     f"<title>{escape(line.dots[index])}</title></circle>"
                 )
+            if line.marks:
+                # At the right edge there is no room on the right.
+                side, shift = ("end", -7) if at[0] > 0.8 * _WIDTH else ("start", 7)
+                marks.append(
+                    f'<text x="{at[0] + shift:.1f}" y="{at[1] - 5:.1f}" text-anchor="{side}">'
+                    f"{escape(line.marks[index])}</text>"
+                )
         stroke = f'stroke="{line.color}"{_dashes(line)}'
-        return f'<path class="curve" d="{"".join(path)}" {stroke}/>' + "".join(dots)
+        return f'<path class="curve" d="{"".join(path)}" {stroke}/>' + "".join(dots + marks)
 
 
 def _dashes(line: Line) -> str:

@@ -4,7 +4,7 @@ import base64
 import csv
 import io
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import accumulate
@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lobefit import picture, preview
+from lobefit import picture, pictures, preview
 from lobefit.atomic import make_folder, write_bytes
+from lobefit.pictures import Picture
 from lobefit.plot import Line, legend, plot
 from lobefit.record import ERRORS, Fit, Record
 
@@ -22,6 +23,13 @@ _COLORS = {
     "modified-phong": "#c2571a",
     "modified-blinn-phong": "#2a6fb0",
     "interpolated": "#2c8a4b",
+}
+_KINDS = {
+    "measured": "#2c8a4b",
+    "lobe": "#2a6fb0",
+    "live": "#8a4bb0",
+    "principled": "#c2571a",
+    "diffuse": "#8b8f96",
 }
 _CHANNELS = (("red", "#c8402f"), ("green", "#3b8f3e"), ("blue", "#3166c4"))
 _ERROR_TITLES = {
@@ -72,11 +80,18 @@ def write(
     records: list[Record],
     renderings: Mapping[str, Rendering] | None = None,
     failures: Iterable[str] = (),
+    ways: Mapping[str, Sequence[Picture]] | None = None,
 ) -> None:
-    """Writes index.html and report.csv. `renderings` are found by a record's name."""
+    """Writes index.html, report.csv and, where there are `ways` to show a record, pictures.csv.
+
+    `renderings` and `ways` (see `pictures.measure`) are found by a record's name.
+    """
     place = make_folder(folder)
     write_bytes(place / "report.csv", table(records).encode())
-    write_bytes(place / "index.html", page(records, renderings or {}, failures).encode())
+    if ways:
+        write_bytes(place / "pictures.csv", pictures.table(ways).encode())
+    text = page(records, renderings or {}, failures, ways or {})
+    write_bytes(place / "index.html", text.encode())
 
 
 def table(records: list[Record]) -> str:
@@ -98,7 +113,10 @@ def table(records: list[Record]) -> str:
 
 
 def page(
-    records: list[Record], renderings: Mapping[str, Rendering], failures: Iterable[str]
+    records: list[Record],
+    renderings: Mapping[str, Rendering],
+    failures: Iterable[str],
+    ways: Mapping[str, Sequence[Picture]],
 ) -> str:
     """The whole page; it refers to nothing outside of itself."""
     body = [
@@ -109,7 +127,7 @@ def page(
         *(f'<p class="warning">{escape(failure)}</p>' for failure in failures),
         _overview(records),
         *(
-            _section(index, record, renderings.get(record.name))
+            _section(index, record, renderings.get(record.name), ways.get(record.name, ()))
             for index, record in enumerate(records)
         ),
     ]
@@ -135,7 +153,9 @@ def _overview(records: list[Record]) -> str:
     return f"<section><h2>Overview</h2>{_table(head, rows)}</section>"
 
 
-def _section(index: int, record: Record, rendering: Rendering | None) -> str:
+def _section(
+    index: int, record: Record, rendering: Rendering | None, ways: Sequence[Picture]
+) -> str:
     return "".join(
         [
             f'<section id="m{index}"><h2>{escape(record.name)}</h2>',
@@ -150,7 +170,9 @@ def _section(index: int, record: Record, rendering: Rendering | None) -> str:
             _run_time_plot(record),
             "</div><div><h3>Albedo by view angle</h3>",
             _albedo_plot(record),
-            "</div></div><h3>Seconds by stage</h3>",
+            "</div></div><h3>Error of pictures against their cost</h3>",
+            _pictures(ways),
+            "<h3>Seconds by stage</h3>",
             _stages(record),
             _facts(record, rendering),
             "</section>",
@@ -219,6 +241,55 @@ def _run_time(model: str, fit: Fit) -> Line:
     ]
     errors = [stage["l1"] for stage in fit.stages]
     return Line(preview.TITLES[model], ends[1:], errors, _COLORS[model], dots=dots)
+
+
+def _pictures(ways: Sequence[Picture]) -> str:
+    if not ways:
+        return (
+            '<p class="faint">What pictures cost was not measured: that is done by rendering, and '
+            "Blender's Python module (bpy) was not at hand.</p>"
+        )
+    lines = [
+        _line(kind, [way for way in ways if way.kind == kind and way.error is not None])
+        for kind in _KINDS
+    ]
+    floor = next(way.seconds for way in ways if way.kind == pictures.FLOOR) * 1e9
+    highest = max((y for line in lines for y in line.y if y is not None), default=0.0)
+    mark = Line("plain diffuse", [floor, floor], [0.0, highest], _KINDS[pictures.FLOOR], True)
+    shown = [line for line in lines if line.x] + [mark]
+    head = ["material", "specular closures", "sphere error", "ns a sample", "of Principled"]
+    unit = next(way.seconds for way in ways if way.kind == pictures.LANDMARK)
+    rows = [
+        [
+            way.kind,
+            "" if way.count is None else str(way.count),
+            _number(way.error),
+            f"{way.seconds * 1e9:.0f}",
+            f"{way.seconds / unit:.2f}",
+        ]
+        for way in ways
+    ]
+    return (
+        f'<div class="side"><div>{plot(shown, "ns a sample", "sphere error")}{legend(shown)}'
+        '<p class="faint">Processor time of a camera sample under a constant world, measured in '
+        "this run. Numbers at the points count specular closures. Errors are those of the record "
+        "for what was fitted to the measurement, and of pictures at 16 light angles for lobe and "
+        f"live.</p></div><div>{_table(head, rows)}</div></div>"
+    )
+
+
+def _line(kind: str, ways: Sequence[Picture]) -> Line:
+    counts = ["" if way.count is None else str(way.count) for way in ways]
+    return Line(
+        "best-fit Principled" if kind == pictures.LANDMARK else kind,
+        [way.seconds * 1e9 for way in ways],
+        [way.error for way in ways],
+        _KINDS[kind],
+        dots=[
+            f"{kind} {count}: {_number(way.error)}" for way, count in zip(ways, counts, strict=True)
+        ],
+        marks=counts,
+    )
 
 
 def _albedo_plot(record: Record) -> str:
