@@ -116,7 +116,7 @@ def shown_by(material: bpy.types.Material, record: Any) -> Choice:
         return Choice(kind)
     count = material.get(COUNT_KEY)
     entries = [entry for entry in record.closures if entry["target"] == kind]
-    return Choice(kind, next(e for e in entries if len(e["specular"]) == count))
+    return Choice(kind, next((e for e in entries if len(e["specular"]) == count), None))
 
 
 def choices(record: Any, tolerance: float) -> list[Choice]:

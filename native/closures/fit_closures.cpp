@@ -246,7 +246,7 @@ double stiffness_of(const Layout& layout, int curve) {
   return curve < shape_curves * layout.specular ? shape_stiffness : weight_stiffness;
 }
 
-double roughness_penalty(const Layout& layout, const Eigen::VectorXd& x) {
+double stiffness_penalty(const Layout& layout, const Eigen::VectorXd& x) {
   double penalty = 0;
   for (int curve = 0; curve < layout.curves(); ++curve) {
     for (int i = 1; i + 1 < n; ++i) {
@@ -269,57 +269,40 @@ void add_penalty(const Layout& layout, const Eigen::VectorXd& x, Equations& equa
   }
 }
 
-// Which views and how many threads; the sums are formed in the order of the views.
-struct Effort {
-  int every_view = 1;
-  int threads = 1;
-};
-
-int used_views(const Problem& problem, const Effort& effort) {
-  return (static_cast<int>(problem.target->size()) + effort.every_view - 1) / effort.every_view;
+// Calls visit for every stride-th view of the problem.
+template <typename Visitor>
+void for_each_view(const Problem& problem, int stride, Visitor&& visit) {
+  for (std::size_t i = 0; i < problem.target->size(); i += static_cast<std::size_t>(stride)) {
+    visit((*problem.target)[i]);
+  }
 }
 
-const TargetView& used_view(const Problem& problem, const Effort& effort, int index) {
-  return (*problem.target)[static_cast<std::size_t>(index * effort.every_view)];
-}
-
-double smooth_error(const Problem& problem, const Effort& effort, const Eigen::VectorXd& x,
+double smooth_error(const Problem& problem, int stride, const Eigen::VectorXd& x,
                     double smoothing) {
-  std::vector<double> errors(static_cast<std::size_t>(used_views(problem, effort)));
-  parallel_for(static_cast<int>(errors.size()), effort.threads, [&](int i) {
-    errors[static_cast<std::size_t>(i)] =
-        view_error(problem, used_view(problem, effort, i), x, smoothing);
-  });
   double sum = 0;
-  for (const double error : errors) sum += error;
-  return effort.every_view * sum + roughness_penalty(problem.layout, x);
+  for_each_view(problem, stride,
+                [&](const TargetView& view) { sum += view_error(problem, view, x, smoothing); });
+  return stride * sum + stiffness_penalty(problem.layout, x);
 }
 
-Equations linearise(const Problem& problem, const Effort& effort, const Eigen::VectorXd& x,
+Equations linearise(const Problem& problem, int stride, const Eigen::VectorXd& x,
                     double smoothing) {
-  const int views = used_views(problem, effort);
-  std::vector<ViewEquations> parts(static_cast<std::size_t>(views));
-  parallel_for(views, effort.threads, [&](int i) {
-    parts[static_cast<std::size_t>(i)] =
-        linearise_view(problem, used_view(problem, effort, i), x, smoothing);
-  });
   const int unknowns = problem.layout.unknowns(), curves = problem.layout.curves();
   Equations sum{Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns)};
-  for (int v = 0; v < views; ++v) {
-    const ViewEquations& part = parts[static_cast<std::size_t>(v)];
-    const auto support = ViewSplines::at(used_view(problem, effort, v).wo.z());
+  for_each_view(problem, stride, [&](const TargetView& view) {
+    const ViewEquations part = linearise_view(problem, view, x, smoothing);
+    const auto support = ViewSplines::at(view.wo.z());
     const Eigen::Map<const Eigen::Vector4d> share(support.share.data());
-    const Eigen::Matrix4d both = effort.every_view * share * share.transpose();
+    const Eigen::Matrix4d both = stride * share * share.transpose();
     for (int q = 0; q < curves; ++q) {
-      sum.gradient.segment<4>(q * n + support.first) +=
-          effort.every_view * part.gradient[q] * share;
+      sum.gradient.segment<4>(q * n + support.first) += stride * part.gradient[q] * share;
       for (int p = 0; p < curves; ++p) {
         if (part.matrix(p, q) == 0) continue;
         sum.matrix.block<4, 4>(p * n + support.first, q * n + support.first) +=
             part.matrix(p, q) * both;
       }
     }
-  }
+  });
   add_penalty(problem.layout, x, sum);
   return sum;
 }
@@ -345,17 +328,17 @@ Eigen::VectorXd step_from(const Eigen::VectorXd& x, const Bounds& bounds,
 }
 
 // Levenberg and Marquardt's method on smooth_error.
-Eigen::VectorXd descend(const Problem& problem, const Effort& effort, Eigen::VectorXd x,
-                        double smoothing, int iterations, const Monitor& monitor) {
+Eigen::VectorXd descend(const Problem& problem, int stride, Eigen::VectorXd x, double smoothing,
+                        int iterations, const Monitor& monitor) {
   const Bounds bounds = bounds_of(problem.layout);
-  double error = smooth_error(problem, effort, x, smoothing), damping = 1e-3;
+  double error = smooth_error(problem, stride, x, smoothing), damping = 1e-3;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     monitor.throw_if_cancelled();
-    const Equations equations = linearise(problem, effort, x, smoothing);
+    const Equations equations = linearise(problem, stride, x, smoothing);
     const double before = error;
     for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
       const Eigen::VectorXd tried = step_from(x, bounds, equations, damping);
-      const double tried_error = smooth_error(problem, effort, tried, smoothing);
+      const double tried_error = smooth_error(problem, stride, tried, smoothing);
       const bool better = tried_error < error;
       if (better) {
         x = tried;
@@ -564,12 +547,11 @@ FittedClosures fit_closures(const Target& target, const ClosureFitOptions& optio
   if (target.empty()) return {};
   const int threads = thread_count(options.threads);
   std::vector<Candidate> found = starts(target, options.specular);
-  const auto follow = [&](double smoothing, int iterations, int every_view) {
+  const auto follow = [&](double smoothing, int iterations, int stride) {
     parallel_for(static_cast<int>(found.size()), threads, [&](int i) {
       Candidate& candidate = found[static_cast<std::size_t>(i)];
-      const Effort effort{every_view, 1};
-      candidate.x = descend(candidate.problem, effort, candidate.x, smoothing, iterations, monitor);
-      candidate.error = smooth_error(candidate.problem, effort, candidate.x, 1e-3);
+      candidate.x = descend(candidate.problem, stride, candidate.x, smoothing, iterations, monitor);
+      candidate.error = smooth_error(candidate.problem, stride, candidate.x, 1e-3);
     });
     std::stable_sort(found.begin(), found.end(),
                      [](const Candidate& a, const Candidate& b) { return a.error < b.error; });

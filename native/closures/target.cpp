@@ -4,13 +4,15 @@
 #include <array>
 #include <cmath>
 
+#include "closures/view_curve.h"
+
 namespace lobefit {
 namespace {
 
 constexpr int views = 36, rings = 40, sectors = 14;
 // sqrt(cos theta) of the views: evenly spaced, so that they crowd at grazing angles, where
 // reflectance changes fastest.
-constexpr double least_root = 0.15;
+constexpr double least_root = ViewSplines::least_root;
 // Views flatter than this are a hundredth of a sphere's picture, but can be so bright, or measured
 // so badly, that they would rule all others.
 constexpr double least_picture_cosine = 0.1;
