@@ -37,9 +37,8 @@ Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vecto
   const Vector3 half = (light + viewer).normalized();
   Rgb result = at(closures.diffuse, cosine) * (wi.z() / pi);
   for (const SpecularClosure& specular : closures.specular) {
-    const Shape shape = to_shape({specular.roughness(cosine), specular.anisotropy(cosine),
-                                  specular.bend(cosine)},
-                                 sine);
+    const Shape shape = to_shape(
+        {specular.roughness(cosine), specular.anisotropy(cosine), specular.bend(cosine)}, sine);
     result += at(specular.weight, cosine) *
               Microfacet(specular.distribution, shape, viewer).evaluate(light, half);
   }
