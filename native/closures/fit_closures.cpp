@@ -80,9 +80,13 @@ AtView at_view(const Eigen::VectorXd& x, double cosine) {
   return at;
 }
 
-// How far a closure may be bent at a view angle: its mirror direction stays above the horizon,
-// else Cycles bends it back (and the viewer above the closure's own horizon).
-double least_tilt(double cosine, double sine) { return -0.9 * cosine / (1 + sine); }
+// How far a closure may be bent at a view angle. Cycles bends a normal back whose mirror direction
+// of the viewer is not clear of the horizon: its height has to be .01, or .9 of the viewer's own.
+double least_tilt(double cosine) {
+  const double least_height = std::min(0.9 * cosine, 0.0105);
+  return -std::tan((std::asin(cosine) - std::asin(least_height)) / 2);
+}
+// The viewer stays above the closure's own horizon.
 double greatest_tilt(double cosine, double sine) {
   return 0.9 * (1 + sine) / std::max(cosine, 0.02);
 }
@@ -104,8 +108,7 @@ ClippedShape shape_at(const AtView& at, const Layout& layout, int closure, doubl
   ClippedShape result;
   result.shape.log_alpha_x = clip(m - h, least_log_alpha, 0, result.x_free);
   result.shape.log_alpha_y = clip(m + h, least_log_alpha, 0, result.y_free);
-  result.shape.tilt =
-      clip(t, least_tilt(cosine, at.sine), greatest_tilt(cosine, at.sine), result.tilt_free);
+  result.shape.tilt = clip(t, least_tilt(cosine), greatest_tilt(cosine, at.sine), result.tilt_free);
   return result;
 }
 
