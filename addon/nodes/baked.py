@@ -149,9 +149,7 @@ class _Group:
         links.new(total, self.formulas.node("NodeGroupOutput").inputs[0])
 
 
-def _set_points(
-    mapping: bpy.types.CurveMapping, mapped: bpy.types.CurveMap, curve: Curve
-) -> None:
+def _set_points(mapping: bpy.types.CurveMapping, mapped: bpy.types.CurveMap, curve: Curve) -> None:
     # Clipping would cut values outside of [0, 1] as the points are set.
     mapping.use_clip = False
     mapping.extend = "HORIZONTAL"
