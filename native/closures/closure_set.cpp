@@ -30,11 +30,13 @@ Shape to_shape(const ClosureSockets& sockets, double sine) {
 ClosuresAtView::ClosuresAtView(const ClosureSet& closures, const Vector3& wo)
     : diffuse_(at(closures.diffuse, wo.z()) / pi) {
   const double cosine = wo.z();
+  if (pi * diffuse_.mean() < least_weight) diffuse_ = 0;
   for (const SpecularClosure& specular : closures.specular) {
+    const Rgb weight = at(specular.weight, cosine);
+    if (weight.mean() < least_weight) continue;
     const Shape shape = to_shape(
         {specular.roughness(cosine), specular.anisotropy(cosine), specular.bend(cosine)}, wo.x());
-    specular_.emplace_back(Microfacet(specular.distribution, shape, wo),
-                           at(specular.weight, cosine));
+    specular_.emplace_back(Microfacet(specular.distribution, shape, wo), weight);
   }
 }
 

@@ -52,6 +52,9 @@ class ClosuresAtView {
   std::vector<std::pair<Microfacet, Rgb>> specular_;  // with their weights
 };
 
+// Cycles drops a closure whose weight, the mean of its channels, is less than this.
+inline constexpr double least_weight = 1e-5;
+
 // f cos(theta_i) in 1/sr, as Cycles 4.2 and later evaluate it, for unit vectors toward the light
 // (wi) and the viewer (wo), n = +z; 0 below the horizon.
 Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo);

@@ -582,6 +582,14 @@ FittedClosures fit_closures(const Target& target, const ClosureFitOptions& optio
   result.error = error_of_closures(target, result.closures);
   leave_out(target, result);
   result.by_view = look_at(target, result.closures);
+  // Of a target that is all but black, Cycles drops closures that the fit relies on: fewer of more
+  // weight may then be nearer.
+  if (options.specular > 0 && result.error > 1.5 * best.error) {
+    ClosureFitOptions fewer = options;
+    --fewer.specular;
+    FittedClosures other = fit_closures(target, fewer, monitor);
+    if (other.error < result.error) return other;
+  }
   return result;
 }
 

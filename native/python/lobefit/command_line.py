@@ -392,8 +392,13 @@ def _report(options: argparse.Namespace) -> int:
     if records:
         ways = {}
         if blender.has_blender():
-            records = [pictures.with_closures(record) for record in records]
+            records = [_with_closures(record) for record in records]
             ways = {record.name: pictures.measure(record) for record in records}
         report.write(options.output, records, ways=ways)
         print(Path(options.output) / "index.html")
     return code
+
+
+def _with_closures(record: Record) -> Record:
+    with progress_bar(record.name) as progress:
+        return pictures.with_closures(record, progress)

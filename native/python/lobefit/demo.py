@@ -41,8 +41,8 @@ class _Demo:
         """One material, from its file to its picture."""
         with progress_bar(path.name) as progress:
             record = record_of(path, progress, model="all", norm=VISUAL_NORM, closures=[Closures()])
-        if self.has_blender:
-            record = pictures.with_closures(record)
+            if self.has_blender:
+                record = pictures.with_closures(record, progress)
         record.save(make_folder(self.folder / "records") / f"{path.stem}.json")
         self.records.append(record)
         if self.has_blender:
@@ -52,7 +52,7 @@ class _Demo:
         self.rows.append(preview.row(record, read(path), rendered=pixels))
 
     def build(self, record: Record, name: str) -> None:
-        """The Blender file of a record, and the picture that Cycles makes of it."""
+        """The Blender file of a record, the picture that Cycles makes of it, and what it costs."""
         blender.write_blend(make_folder(self.folder / "blend") / f"{name}.blend", record, KIND)
         start = time.perf_counter()
         pixels = blender.render(record, preview.SPHERE * preview.FINER, KIND)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from lobefit import _native, blender
 from lobefit._native import Measurement
-from lobefit.fitting import Closures, Job
+from lobefit.fitting import closures
+from lobefit.inputs import Progress
 from lobefit.preview import measurement_of
 from lobefit.record import Record
 
@@ -43,13 +44,15 @@ class Picture:
     seconds: float
 
 
-def with_closures(record: Record) -> Record:
+def with_closures(record: Record, progress: Progress | None = None) -> Record:
     """The record with all of `COMPARED`, or as it is where its measurement is no longer there."""
     if measurement_of(record) is None:
         return record
     held = {(entry["target"], entry["count"]) for entry in record.closures}
-    missing = [Closures(*pair) for pair in COMPARED if pair not in held]
-    return Job(record, closures=missing).record() if missing else record
+    for target, count in COMPARED:
+        if (target, count) not in held:
+            record = closures(record, target=target, count=count, progress=progress)
+    return record
 
 
 def measure(record: Record) -> list[Picture]:
