@@ -372,8 +372,10 @@ Eigen::VectorXd start_at(const Layout& layout, const std::vector<double>& alphas
   return x;
 }
 
+constexpr std::array<double, 6> start_alphas = {0.008, 0.025, 0.07, 0.17, 0.4, 0.9};
+
 std::vector<Candidate> starts(const Target& target, int specular) {
-  constexpr std::array<double, 6> alphas = {0.008, 0.025, 0.07, 0.17, 0.4, 0.9};
+  constexpr auto& alphas = start_alphas;
   std::vector<Candidate> all;
   const auto add = [&](const std::vector<double>& chosen, const Distributions& distributions,
                        std::vector<double> bends = {}) {
@@ -402,11 +404,75 @@ std::vector<Candidate> starts(const Target& target, int specular) {
       }
       for (std::size_t k = j + 1; specular == 3 && k < count; ++k) {
         add({alphas[i], alphas[j], alphas[k]}, {ggx, ggx, ggx});
-        add({alphas[i], alphas[j], alphas[k]}, {beckmann, ggx, ggx});
       }
     }
   }
   return all;
+}
+
+// A candidate with one closure more, of any width and all but black: so it can only become better.
+std::vector<Candidate> extended(const Candidate& candidate) {
+  const Layout& from = candidate.problem.layout;
+  const Layout to{from.specular + 1};
+  std::vector<Candidate> all;
+  for (const double alpha : start_alphas) {
+    for (const auto distribution : {Distribution::ggx, Distribution::beckmann}) {
+      Candidate more{{candidate.problem.target, to, candidate.problem.distributions},
+                     Eigen::VectorXd::Zero(to.unknowns()),
+                     0};
+      more.problem.distributions.push_back(distribution);
+      const auto copy = [&](int to_curve, int from_curve, int curves) {
+        more.x.segment(to_curve * n, curves * n) = candidate.x.segment(from_curve * n, curves * n);
+      };
+      copy(0, 0, from.specular * shape_curves);
+      more.x.segment(to.shape(from.specular, mean) * n, n).setConstant(std::log(alpha));
+      for (int k = 0; k < from.specular; ++k) copy(to.weight(k, 0), from.weight(k, 0), 3);
+      more.x.segment(to.weight(from.specular, 0) * n, 3 * n).setConstant(1e-3);
+      copy(to.weight(to.specular, 0), from.weight(from.specular, 0), 3);
+      all.push_back(std::move(more));
+    }
+  }
+  return all;
+}
+
+// The best closures, their curves still splines; progress runs between two numbers.
+Candidate search(const Target& target, int specular, int threads, Monitor& monitor,
+                 double progress_from, double progress_to) {
+  std::vector<Candidate> found = starts(target, specular);
+  if (specular == most_specular_closures) {
+    const double middle = (progress_from + progress_to) / 2;
+    const auto warm =
+        extended(search(target, specular - 1, threads, monitor, progress_from, middle));
+    found.insert(found.end(), warm.begin(), warm.end());
+    progress_from = middle;
+  }
+  const auto report = [&](const char* stage, double share) {
+    monitor.report(stage, progress_from + share * (progress_to - progress_from));
+  };
+  const auto follow = [&](double smoothing, int iterations, int stride) {
+    parallel_for(static_cast<int>(found.size()), threads, [&](int i) {
+      Candidate& candidate = found[static_cast<std::size_t>(i)];
+      candidate.x = descend(candidate.problem, stride, candidate.x, smoothing, iterations, monitor);
+      candidate.error = smooth_error(candidate.problem, stride, candidate.x, 1e-3);
+    });
+    std::stable_sort(found.begin(), found.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
+  };
+  const auto keep = [&](std::size_t most) {
+    found.resize(std::min(found.size(), most), found.front());
+  };
+  report("Trying closures", 0);
+  follow(0.3, 5, 3);
+  keep(12);
+  report("Trying closures", 0.2);
+  follow(0.1, 10, 2);
+  keep(5);
+  report("Fitting closures", 0.4);
+  follow(0.03, 20, 1);
+  keep(2);
+  report("Fitting closures", 0.7);
+  for (const double smoothing : {0.01, 0.002}) follow(smoothing, 30, 1);
+  return found.front();
 }
 
 // How far curve nodes may be off the curves that were fitted, as a part of what they stand for: so
@@ -548,32 +614,8 @@ void leave_out(const Target& target, FittedClosures& fitted) {
 FittedClosures fit_closures(const Target& target, const ClosureFitOptions& options,
                             Monitor& monitor) {
   if (target.empty()) return {};
-  const int threads = thread_count(options.threads);
-  std::vector<Candidate> found = starts(target, options.specular);
-  const auto follow = [&](double smoothing, int iterations, int stride) {
-    parallel_for(static_cast<int>(found.size()), threads, [&](int i) {
-      Candidate& candidate = found[static_cast<std::size_t>(i)];
-      candidate.x = descend(candidate.problem, stride, candidate.x, smoothing, iterations, monitor);
-      candidate.error = smooth_error(candidate.problem, stride, candidate.x, 1e-3);
-    });
-    std::stable_sort(found.begin(), found.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
-  };
-  const auto keep = [&](std::size_t most) {
-    found.resize(std::min(found.size(), most), found.front());
-  };
-  monitor.report("Trying closures", 0);
-  follow(0.3, 5, 3);
-  keep(12);
-  monitor.report("Trying closures", 0.2);
-  follow(0.1, 10, 2);
-  keep(5);
-  monitor.report("Fitting closures", 0.4);
-  follow(0.03, 20, 1);
-  keep(2);
-  monitor.report("Fitting closures", 0.7);
-  for (const double smoothing : {0.01, 0.002}) follow(smoothing, 30, 1);
-  const Candidate& best = found.front();
+  const Candidate best =
+      search(target, options.specular, thread_count(options.threads), monitor, 0, 1);
   const double tolerance = curve_tolerance(best.error);
   WeightFactors factors;
   FittedClosures result{to_closures(best.problem, best.x, tolerance, factors), 0, {}};
