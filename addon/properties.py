@@ -1,4 +1,4 @@
-"""The options of a fit, as properties that every operator which fits has.
+"""The options of operators, as properties that they and the panels have in common.
 
 What the user chose last lives with the operator (`operator_properties_last`) and a fit under way in
 `operators.run`: nothing of it is saved in files, which hold only the record in each material.
@@ -6,7 +6,7 @@ What the user chose last lives with the operator (`operator_properties_last`) an
 
 from typing import Any
 
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 MODELS = (
     ("interpolated", "Interpolated", "A blend of the two others, and closer than both"),
@@ -51,4 +51,41 @@ class FitOptions:
 def draw_fit_options(layout: Any, options: Any) -> None:
     """Draws the options; `options` is an operator or its last properties."""
     for name in FitOptions.__annotations__:
+        layout.prop(options, name)
+
+
+class SimplifyOptions:
+    """How to simplify a scene; mixed into an operator."""
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        subtype="PERCENTAGE",
+        default=1.0,
+        min=0.0,
+        max=100.0,
+        precision=2,
+        description="Up to which part of the picture's light may be off on any sampled frame",
+    )
+    frames: IntProperty(
+        name="Frames",
+        default=8,
+        min=1,
+        max=10000,
+        description="How many frames of the scene's range to look at, evenly spread",
+    )
+    diffuse_bounces: BoolProperty(
+        name="Diffuse Bounces",
+        default=False,
+        description="Show only a diffuse closure to light that bounced off a diffuse surface",
+    )
+    timed: BoolProperty(
+        name="Time It",
+        default=False,
+        description="Render the current frame before and after, small and with few samples",
+    )
+
+
+def draw_simplify_options(layout: Any, options: Any) -> None:
+    """Draws the options; `options` is an operator or its last properties."""
+    for name in SimplifyOptions.__annotations__:
         layout.prop(options, name)

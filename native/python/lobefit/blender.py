@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 
 from lobefit._native import InputError
 from lobefit.atomic import written_aside
+from lobefit.inputs import Progress
 from lobefit.record import Record
 
 KINDS = ("live", "principled")
+
+_POLL = 0.1  # seconds between two looks at work under way
 
 
 def need_blender() -> None:
@@ -48,6 +51,74 @@ def render(record: Record, size: int) -> NDArray[np.float32]:
     with _quiet():
         pixels: NDArray[np.float32] = render_pixels(scene)
     return pixels
+
+
+def simplify(
+    path: str | os.PathLike[str],
+    output: str | os.PathLike[str] | None,
+    tolerance: float,
+    frames: int,
+    diffuse_bounces: bool = False,
+    timed: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Simplifies the measured materials of a Blender file's scene; returns what was done.
+
+    `tolerance` is a part of the picture's light. Nothing is written where `output` is None. Raises
+    InputError for a file that cannot be read, or whose scene has no camera to look through.
+    """
+    _open(path)
+    import bpy
+    from lobefit_addon.simplification import simplify as simplify_scene
+    from lobefit_addon.survey import Survey
+
+    survey = Survey(bpy.context, frames)
+    try:
+        while not survey.advance(_POLL):
+            if progress:
+                progress(survey.progress, survey.text)
+    finally:
+        survey.stop()
+    if survey.problem:
+        raise InputError(f"{path}: {survey.problem}")
+    with _quiet():
+        result: dict[str, Any] = simplify_scene(
+            bpy.context, survey, tolerance, diffuse_bounces, timed
+        )
+    if output is not None:
+        _save(output)
+    return result
+
+
+def restore(path: str | os.PathLike[str], output: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """Puts back what simplified materials of a Blender file showed; returns their names."""
+    _open(path)
+    import bpy
+    from lobefit_addon.simplification import restore_all
+
+    result: dict[str, Any] = restore_all(bpy.context)
+    if output is not None:
+        _save(output)
+    return result
+
+
+def _open(path: str | os.PathLike[str]) -> None:
+    if not Path(path).is_file():
+        raise InputError(f"{path}: expected a Blender file, found no such file.")
+    import bpy
+
+    with _quiet():
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(Path(path).absolute()), load_ui=False)
+        except RuntimeError as error:
+            raise InputError(
+                f"{path}: expected a Blender file, found one that cannot be opened, "
+                f"{_one_line(error)}."
+            ) from error
+
+
+def _one_line(error: RuntimeError) -> str:
+    return " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
 
 
 def _two_lights_scene(records: list[Record], kind: str, size: int) -> Any:
