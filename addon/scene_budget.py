@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .angle_errors import errors_by_angle
 from .nodes.baked import is_black
 from .nodes.material import BAKED, build_material, fill_material
 from .records import BEFORE_COUNT_KEY, BEFORE_KIND_KEY, COUNT_KEY, KEY, KIND_KEY
@@ -91,16 +92,19 @@ def _closures_way(record: Any, entry: Mapping[str, Any]) -> Way:
 def _one_lobe_way(record: Any, kind: str, cost: float, error: float | None) -> Way:
     """A way of which a record tells the error over all angles only.
 
-    It is taken to grow toward grazing as that of the fewest specular closures does.
+    That at each angle is found by comparing it with the closures that are nearest to the
+    measurement; where there are none, it is taken to be everywhere the same.
     """
     known = np.inf if error is None else error
-    entries = [e for e in record.closures if e["target"] == "measured" and e["count"] > 0]
-    few = min(entries, key=lambda entry: entry["count"], default=None)
-    if few is None or few["error"] == 0:
+    nearest = min(
+        (entry for entry in record.closures if entry["target"] == "measured"),
+        key=lambda entry: entry["error"],
+        default=None,
+    )
+    if nearest is None:
         return Way(kind, 0, cost, known, np.full(DEGREES, known))
-    by_view = few["by_view"]
-    by_angle = _at_angles(by_view["view_angle"], by_view["relative_error"])
-    return Way(kind, 0, cost, known, known * by_angle / few["error"])
+    by_angle = errors_by_angle(record, kind, nearest)
+    return Way(kind, 0, cost, known, _at_angles(nearest["by_view"]["view_angle"], by_angle))
 
 
 def _fit_error(record: Any) -> float:
