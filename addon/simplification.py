@@ -1,7 +1,9 @@
 """Simplifies the materials of a scene, puts them back, and tells what was done.
 
 The result is one dictionary of plain values, kept as JSON with the scene: shares and errors are
-parts of the picture (1 is all of it), costs are in specular closures.
+parts of the picture (1 is all of it), costs are in specular closures. `error_added` is against the
+nearest kinds there are, `error` and `error_before` are against the measurements, all of them in the
+worst frame.
 """
 
 import json
@@ -25,6 +27,7 @@ from .scene_budget import (
     restore,
     show,
     subject_of,
+    ways_of,
 )
 from .scene_view import lights, shown_only_in_renders
 from .survey import Survey
@@ -41,7 +44,7 @@ def simplify(
 ) -> dict[str, Any]:
     """Changes the materials of the current scene to what it needs, and returns the result.
 
-    `tolerance` is the part of the light of the picture that may be off. With `diffuse_bounces`
+    `tolerance` is the part of the picture's light that may be changed. With `diffuse_bounces`
     materials get a diffuse closure for rays that left a diffuse surface; with `timed` the current
     frame is rendered before and after.
     """
@@ -70,7 +73,6 @@ def simplify(
         ],
         "skipped": [{"material": name, "reason": reason} for name, reason in skipped],
     }
-    result["within"] = result["error"] <= tolerance * (1 + 1e-9)
     if choices:
         scene[RESULT_KEY] = json.dumps(result)
     return result
@@ -110,6 +112,8 @@ def _subjects(
     """The materials to choose for, and the others of the scene with the reason why not."""
     present, hidden = survey.present(), shown_only_in_renders(context)
     subjects, skipped = [], []
+    # Many materials may have one record.
+    ways: dict[str, tuple[Way, ...]] = {}
     for material in list(bpy.data.materials):
         uid = material.session_uid
         if KEY not in material or uid not in present | set(hidden):
@@ -119,7 +123,11 @@ def _subjects(
             reason = f"the viewport hides {hidden[uid]}, which renders show"
         elif not reason:
             record = survey.records.get(uid)
-            found = "it is new" if record is None else subject_of(material, record)
+            found = "it is new"
+            if record is not None:
+                text = record.to_json()
+                ways[text] = ways.get(text) or ways_of(record)
+                found = subject_of(material, record, ways[text])
             if isinstance(found, str):
                 reason = found
             elif not is_as_built(material, record, found.now, _has_bounces(material)):
@@ -153,6 +161,7 @@ def _sums(choices: list[Choice]) -> dict[str, float]:
     zero = np.zeros(1)
     saved = (float(c.share.mean()) * (c.subject.now.cost - c.way.cost) for c in choices)
     return {
+        "error_added": float(sum((c.added for c in choices), zero).max()),
         "error": float(sum((c.error for c in choices), zero).max()),
         "error_before": float(sum((c.error_before for c in choices), zero).max()),
         "closures_saved": sum(saved),
@@ -168,8 +177,9 @@ def _row(choice: Choice, changed: bool) -> dict[str, Any]:
         "changed": changed,
         "share": float(choice.share.mean()),
         "angles": _angles(choice),
+        "error_added": float(choice.added.max()),
         "error": float(choice.error.max()),
-        "error_added": float((choice.error - choice.error_before).max()),
+        "error_before": float(choice.error_before.max()),
         "left_out": left_out(choice.subject, way),
         "closures_saved": now.cost - way.cost,
     }

@@ -41,9 +41,9 @@ class LOBEFIT_OT_simplify_scene(SimplifyOptions, RunsWork, bpy.types.Operator):
             return self.refuse("Expected a measured material in the scene, found none to simplify.")
         changed = sum(row["changed"] for row in result["materials"])
         self.report(
-            {"INFO"} if result["within"] else {"WARNING"},
-            f"{changed} of {len(result['materials'])} materials changed, at most "
-            f"{result['error']:.2%} of the picture is off",
+            {"INFO"},
+            f"{changed} of {len(result['materials'])} materials changed, which adds at most "
+            f"{result['error_added']:.2%} of error to the picture",
         )
         bpy.ops.ed.undo_push(message=self.bl_label)
         return {"FINISHED"}

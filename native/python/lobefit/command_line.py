@@ -204,7 +204,7 @@ def _add_simplify(commands: Any) -> None:
         type=_within(float, 0, 100, "a percentage"),
         default=1.0,
         metavar="PERCENT",
-        help="of the picture's light that may be off on any sampled frame; " + _DEFAULT,
+        help="of the picture's light that may change on any sampled frame; " + _DEFAULT,
     )
     command.add_argument(
         "--frames",

@@ -11,11 +11,13 @@ def lines(result: Mapping[str, Any]) -> list[str]:
     told = list(_table([_TITLES, *map(_cells, result["materials"])])) if result["materials"] else []
     frames = ", ".join(map(str, result["frames"]))
     told.append(
-        f"{result['error']:.3%} of the picture is off at most, {result['tolerance']:.3%} asked "
-        f"for, on frames {frames}"
+        f"{result['error_added']:.3%} of error added to the picture at most, "
+        f"{result['tolerance']:.3%} allowed, on frames {frames}"
     )
-    if not result["within"]:
-        told.append("  that is the least there is: no kind of these materials is nearer")
+    told.append(
+        f"{result['error']:.3%} is then off at most against the measurements, before "
+        f"{result['error_before']:.3%}"
+    )
     told.append(f"{result['closures_saved']:.2f} closures saved in a pixel on average")
     seconds = result["seconds"]
     if seconds["after"] is not None:
@@ -47,7 +49,7 @@ def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
         _way(row["after"]),
         f"{row['share']:.2%}",
         "never" if angles is None else f"{angles[0]:.0f} to {angles[1]:.0f} deg",
-        f"{row['error_added']:+.3%}",
+        f"{row['error_added']:.3%}",
         f"{row['closures_saved']:+.2f}",
         row["left_out"],
     )
