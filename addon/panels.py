@@ -1,4 +1,4 @@
-"""Properties > Material > Measured BRDF, and the progress of a fit in the status bar."""
+"""The panels in Properties > Material and > Render, and progress in the status bar."""
 
 import textwrap
 from pathlib import Path
@@ -8,13 +8,16 @@ from typing import Any, ClassVar
 import bpy
 
 from . import native
-from .nodes.material import shown_by
+from .nodes.material import BAKED, shown_by
 from .operators.fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .operators.import_measured import LOBEFIT_OT_import_measured
 from .operators.preview import LOBEFIT_OT_preview, icons_of
 from .operators.run import current
-from .properties import KINDS, MODELS, draw_fit_options
+from .operators.simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
+from .properties import KINDS, MODELS, draw_fit_options, draw_simplify_options
 from .records import active_material, record_of
+from .scene_budget import is_simplified
+from .simplification import result_of
 
 TITLE = "Measured BRDF"
 # Up to which part of the reflected light that is off, what to call a fit.
@@ -67,6 +70,61 @@ class LOBEFIT_PT_import_measured(_MaterialPanel, bpy.types.Panel):
             draw_progress(self.layout)
         else:
             _draw_hint(self.layout, active_material(context), _characters(context))
+
+
+class LOBEFIT_PT_simplify_scene(bpy.types.Panel):
+    """Leaves out of measured materials what the scene does not need, and shows the last result"""
+
+    bl_label = "Simplify Measured Materials"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_problem(self.layout, context)
+        if current():
+            draw_progress(self.layout)
+            return
+        idname = LOBEFIT_OT_simplify_scene.bl_idname
+        column = self.layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        draw_simplify_options(column, context.window_manager.operator_properties_last(idname))
+        row = self.layout.row()
+        row.operator(idname, text="Simplify", icon="MATERIAL")
+        if any(map(is_simplified, bpy.data.materials)):
+            row.operator(LOBEFIT_OT_restore_scene.bl_idname, text="Restore", icon="LOOP_BACK")
+        result = result_of(context.scene)
+        if result is not None:
+            _draw_result(self.layout, result, _characters(context))
+
+
+def _draw_result(layout: Any, result: dict[str, Any], characters: int) -> None:
+    frames = ", ".join(map(str, result["frames"]))
+    sentence = (
+        f"At most {result['error_added']:.2%} of error added to the picture "
+        f"({result['tolerance']:.2%} allowed), on frames {frames}."
+    )
+    _paragraph(layout, sentence, "CHECKMARK", characters)
+    for row in result["materials"]:
+        box = layout.box().column(align=True)
+        box.label(text=f"{row['material']}: {_kind(row['before'])} > {_kind(row['after'])}")
+        seen = (
+            "not seen" if row["angles"] is None else "{:.0f} to {:.0f} deg".format(*row["angles"])
+        )
+        box.label(text=f"{row['share']:.1%} of the picture, {seen}")
+        box.label(text=f"{row['error_added']:+.2%} error, without {row['left_out']}")
+    seconds = result["seconds"]
+    if seconds["after"] is not None:
+        text = f"Rendered in {seconds['after']:.2f} s, before in {seconds['before']:.2f} s"
+        layout.label(text=text, icon="TIME")
+    for item in result["skipped"]:
+        _paragraph(layout, f"{item['material']}: left, {item['reason']}.", "INFO", characters)
+
+
+def _kind(way: dict[str, Any]) -> str:
+    return f"{way['kind']} {way['count']}" if way["kind"] in BAKED else way["kind"]
 
 
 def _draw_problem(layout: Any, context: bpy.types.Context) -> None:
@@ -169,10 +227,12 @@ def _characters(context: bpy.types.Context) -> int:
 def register() -> None:
     bpy.utils.register_class(LOBEFIT_PT_measured_brdf)
     bpy.utils.register_class(LOBEFIT_PT_import_measured)
+    bpy.utils.register_class(LOBEFIT_PT_simplify_scene)
     bpy.types.STATUSBAR_HT_header.append(_draw_status)
 
 
 def unregister() -> None:
     bpy.types.STATUSBAR_HT_header.remove(_draw_status)
+    bpy.utils.unregister_class(LOBEFIT_PT_simplify_scene)
     bpy.utils.unregister_class(LOBEFIT_PT_import_measured)
     bpy.utils.unregister_class(LOBEFIT_PT_measured_brdf)

@@ -1,4 +1,4 @@
-"""The options of a fit, as properties that every operator which fits has.
+"""The options of operators, as properties that they and the panels have in common.
 
 What the user chose last lives with the operator (`operator_properties_last`) and a fit under way in
 `operators.run`: nothing of it is saved in files, which hold only the record in each material.
@@ -102,4 +102,44 @@ def draw_fit_options(layout: Any, options: Any) -> None:
     if options.kind in (*BAKED, "auto"):
         layout.prop(options, "cap_albedo")
     for name in ("model", "fresnel", "norm", "threads"):
+        layout.prop(options, name)
+
+
+class SimplifyOptions:
+    """How to simplify a scene; mixed into an operator."""
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        subtype="PERCENTAGE",
+        default=1.0,
+        min=0.0,
+        max=100.0,
+        precision=2,
+        description=(
+            "How much of the picture's light may change, against the nearest kinds, on any frame "
+            "looked at"
+        ),
+    )
+    frames: IntProperty(
+        name="Frames",
+        default=8,
+        min=1,
+        max=10000,
+        description="How many frames of the scene's range to look at, evenly spread",
+    )
+    diffuse_bounces: BoolProperty(
+        name="Diffuse Bounces",
+        default=False,
+        description="Show only a diffuse closure to light that bounced off a diffuse surface",
+    )
+    timed: BoolProperty(
+        name="Time It",
+        default=False,
+        description="Render the current frame before and after, small and with few samples",
+    )
+
+
+def draw_simplify_options(layout: Any, options: Any) -> None:
+    """Draws the options; `options` is an operator or its last properties."""
+    for name in SimplifyOptions.__annotations__:
         layout.prop(options, name)

@@ -8,6 +8,10 @@ import bpy
 KEY = "lobefit_record"
 # What the material shows: its kind and the number of its specular closures.
 KIND_KEY, COUNT_KEY = "lobefit_kind", "lobefit_closures"
+# Whether light that bounced off a diffuse surface meets a diffuse closure only.
+BOUNCES_KEY = "lobefit_diffuse_bounces"
+# What a simplified material showed before, with the count by which its record names the closures.
+BEFORE_KIND_KEY, BEFORE_COUNT_KEY = "lobefit_kind_before", "lobefit_closures_before"
 
 
 def active_material(context: bpy.types.Context) -> bpy.types.Material | None:

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,20 @@ def render(scene: bpy.types.Scene, path: str | os.PathLike[str]) -> None:
     """Renders the scene to the PNG file `path`."""
     with _set(scene.render.image_settings, file_format="PNG", color_mode="RGBA", color_depth="8"):
         _render_to(scene, path)
+
+
+def render_seconds(scene: bpy.types.Scene) -> float:
+    """How long Cycles takes for the current frame, half as wide and high with 8 samples a pixel."""
+    few = {"samples": 8, "use_adaptive_sampling": False, "use_denoising": False}
+    with (
+        _set(scene.cycles, **few),
+        _set(scene.render, resolution_percentage=50, use_compositing=False, use_sequencer=False),
+    ):
+        # The first rendering also loads what later ones find in memory.
+        bpy.ops.render.render(scene=scene.name)
+        began = time.perf_counter()
+        bpy.ops.render.render(scene=scene.name)
+    return time.perf_counter() - began
 
 
 def render_pixels(scene: bpy.types.Scene) -> NDArray[np.float32]:

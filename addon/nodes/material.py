@@ -6,7 +6,14 @@ from typing import Any
 
 import bpy
 
-from ..records import COUNT_KEY, KEY, KIND_KEY
+from ..records import (
+    BEFORE_COUNT_KEY,
+    BEFORE_KIND_KEY,
+    BOUNCES_KEY,
+    COUNT_KEY,
+    KEY,
+    KIND_KEY,
+)
 from .baked import baked_group
 from .live import live_group, live_inputs
 from .principled import principled_node
@@ -25,6 +32,7 @@ def build_material(
     name: str | None = None,
     count: int | None = None,
     tolerance: float = TOLERANCE,
+    diffuse_bounces: bool = False,
 ) -> bpy.types.Material:
     """A new material for a `lobefit.Record`, called `name` or like the record; see fill_material.
 
@@ -33,7 +41,7 @@ def build_material(
     """
     choice = choose(record, kind, count, tolerance)
     material = bpy.data.materials.new(record.name if name is None else name)
-    _fill(material, record, choice)
+    _fill(material, record, choice, diffuse_bounces)
     return material
 
 
@@ -43,6 +51,7 @@ def fill_material(
     kind: str = "live",
     count: int | None = None,
     tolerance: float = TOLERANCE,
+    diffuse_bounces: bool = False,
 ) -> None:
     """Replaces the material's nodes by those of a record, and keeps everything else of it.
 
@@ -50,10 +59,11 @@ def fill_material(
     the exporters show. Other kinds than `principled` give Cycles an output of its own: the group
     'Lobefit Live', or a baked group of the fitted lobe (`lobe`) or of the measurement (`measured`)
     with `count` specular closures (the most the record holds, if None). `auto` takes the cheapest
-    that is at most `tolerance` off. The record goes along as JSON in the custom property
+    that is at most `tolerance` off. With `diffuse_bounces` Cycles takes a diffuse closure instead
+    for rays that left a diffuse surface. The record goes along as JSON in the custom property
     `lobefit_record`, and what was chosen in `lobefit_kind` and `lobefit_closures`.
     """
-    _fill(material, record, choose(record, kind, count, tolerance))
+    _fill(material, record, choose(record, kind, count, tolerance), diffuse_bounces)
 
 
 @dataclass(frozen=True)
@@ -132,21 +142,60 @@ def choices(record: Any, tolerance: float) -> list[Choice]:
     return [way for _, _, way in ways]
 
 
-def _fill(material: bpy.types.Material, record: Any, choice: Choice) -> None:
+def _fill(material: bpy.types.Material, record: Any, choice: Choice, diffuse_bounces: bool) -> None:
     tree = empty_shader_tree(material)
     principled = principled_node(tree, record.principled, location=(0.0, 0.0))
     _add_output(tree, "ALL", principled.outputs[0], (500.0, 0.0)).is_active_output = True
+    shader = None
     if choice.kind == "live":
-        _add_output(tree, "CYCLES", _add_live(tree, record.parameters), (500.0, 300.0))
+        shader = _add_live(tree, record.parameters)
     elif choice.closures is not None:
         shader = _add_baked(tree, f"{material.name} {choice.kind}", choice.closures)
+    if shader is not None:
+        if diffuse_bounces:
+            shader = _add_bounces(tree, f"{material.name} bounces", record, shader)
         _add_output(tree, "CYCLES", shader, (500.0, 300.0))
     material[KEY] = record.to_json()
     material[KIND_KEY], material[COUNT_KEY] = choice.kind, choice.count
+    material[BOUNCES_KEY] = diffuse_bounces and shader is not None
+    for key in (BEFORE_KIND_KEY, BEFORE_COUNT_KEY):
+        # A material that is filled anew has nothing to go back to.
+        if key in material:
+            del material[key]
+
+
+def _add_bounces(
+    tree: bpy.types.NodeTree, name: str, record: Any, shader: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """The shader, and for rays that left a diffuse surface what is diffuse of the measurement."""
+    path = tree.nodes.new("ShaderNodeLightPath")
+    path.location = (-250.0, 900.0)
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    mix.location = (300.0, 500.0)
+    tree.links.new(path.outputs["Is Diffuse Ray"], mix.inputs[0])
+    tree.links.new(shader, mix.inputs[1])
+    tree.links.new(_add_diffuse(tree, name, record), mix.inputs[2])
+    return mix.outputs[0]
+
+
+def _add_diffuse(tree: bpy.types.NodeTree, name: str, record: Any) -> bpy.types.NodeSocket:
+    """The record's closures without a specular one, or a diffuse closure of the mean albedo."""
+    for entry in record.closures:
+        if entry["target"] == "measured" and not entry["specular"]:
+            return _add_baked(tree, name, entry, (0.0, 600.0))
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.location = (0.0, 600.0)
+    known = [rgb for rgb in record.albedo["measured"] if None not in rgb] or [[0.5] * 3]
+    mean = [sum(rgb[channel] for rgb in known) / len(known) for channel in range(3)]
+    node.inputs["Color"].default_value = (*mean, 1.0)
+    return node.outputs[0]
 
 
 def _add_baked(
-    tree: bpy.types.NodeTree, name: str, closures: Mapping[str, Any]
+    tree: bpy.types.NodeTree,
+    name: str,
+    closures: Mapping[str, Any],
+    location: tuple[float, float] = (0.0, 300.0),
 ) -> bpy.types.NodeSocket:
     # A material fitted anew replaces its own group; the same source always makes the same tree.
     old = bpy.data.node_groups.get(name)
@@ -155,7 +204,7 @@ def _add_baked(
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = baked_group(name, closures)
     node.name = node.label = name
-    node.width, node.location = 200.0, (0.0, 300.0)
+    node.width, node.location = 200.0, location
     return node.outputs[0]
 
 

@@ -6,12 +6,15 @@ from . import preview
 from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .import_measured import LOBEFIT_FH_measured, LOBEFIT_OT_import_measured, draw_menu
 from .run import current
+from .simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 
 _CLASSES = (
     LOBEFIT_OT_import_measured,
     LOBEFIT_FH_measured,
     LOBEFIT_OT_fit,
     LOBEFIT_OT_cancel_fit,
+    LOBEFIT_OT_simplify_scene,
+    LOBEFIT_OT_restore_scene,
 )
 
 

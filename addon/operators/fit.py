@@ -48,10 +48,10 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
 
 
 class LOBEFIT_OT_cancel_fit(bpy.types.Operator):
-    """End the fit that is under way; nothing is changed"""
+    """End what Lobefit is at work on; nothing is changed"""
 
     bl_idname = "lobefit.cancel_fit"
-    bl_label = "Cancel Fit"
+    bl_label = "Cancel"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

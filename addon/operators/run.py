@@ -1,6 +1,7 @@
-"""How an operator runs fits: polled by a timer in a window, waited for elsewhere."""
+"""How an operator does long work: polled by a timer in a window, waited for elsewhere."""
 
 from collections.abc import Sequence
+from typing import Any, Protocol
 
 import bpy
 
@@ -12,15 +13,33 @@ from ..properties import FitOptions
 _POLL = 0.1  # seconds between two looks at a fit
 
 
-class Run:
-    """A batch under way in a window, with the timer that looks after it."""
+class Work(Protocol):
+    """What is done bit by bit: fits, or looking at a scene."""
 
-    def __init__(self, context: bpy.types.Context, batch: Batch) -> None:
+    @property
+    def progress(self) -> float:
+        """The share that is done, from 0 to 1."""
+
+    @property
+    def text(self) -> str:
+        """What is being done."""
+
+    def advance(self, seconds: float) -> bool:
+        """Goes on for about `seconds` or one indivisible bit; says whether all is done."""
+
+    def stop(self) -> None:
+        """Ends what runs in threads of its own."""
+
+
+class Run:
+    """Work under way in a window, with the timer that looks after it."""
+
+    def __init__(self, context: bpy.types.Context, batch: Work) -> None:
         self.batch = batch
         self._timer = context.window_manager.event_timer_add(_POLL, window=context.window)
 
     def end(self) -> None:
-        """Ends the fit, the timer and what is shown of them."""
+        """Ends the work, the timer and what is shown of them."""
         global _current
         self.batch.stop()
         bpy.context.window_manager.event_timer_remove(self._timer)
@@ -47,38 +66,34 @@ def redraw() -> None:
         bpy.context.workspace.status_text_set(None)
 
 
-class RunsFits(FitOptions):
-    """What the operators that fit have in common; each says in `apply` what it does at the end."""
+class RunsWork:
+    """What the operators that work for long have in common; each concludes in its own way."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if current():
-            cls.poll_message_set("A fit is under way: wait for it or cancel it")
+            cls.poll_message_set("Lobefit is at work: wait for it or cancel it")
         return current() is None
 
-    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
-        """Changes the data-blocks; returns a sentence instead when they are no longer there."""
-        raise TypeError(f"{type(self).__name__} does not say what becomes of its fits")
+    def conclude(self, context: bpy.types.Context, work: Any) -> set[str]:
+        """Called once when all is done; only here are data-blocks changed."""
+        raise TypeError(f"{type(self).__name__} does not say what becomes of its work")
 
-    def fit(self, context: bpy.types.Context, paths: Sequence[str]) -> set[str]:
-        """Fits the files: in the background of a window, or waiting where nobody looks on."""
+    def start(self, context: bpy.types.Context, work: Work) -> set[str]:
+        """Does the work: in the background of a window, or waiting where nobody looks on."""
         global _current
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
-        batch = Batch(paths, self.fit_options())
         if bpy.app.background or not self.options.is_invoke:
-            while not batch.advance(_POLL):
+            while not work.advance(_POLL):
                 pass
-            return self._conclude(context, batch.outcomes)
-        _current = Run(context, batch)
+            return self.conclude(context, work)
+        _current = Run(context, work)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         run = current()
         if run is None:  # cancelled by its button
-            self.report({"INFO"}, "The fit was cancelled")
+            self.report({"INFO"}, "Cancelled, nothing was changed")
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             run.end()
@@ -94,7 +109,7 @@ class RunsFits(FitOptions):
             redraw()
             return {"PASS_THROUGH"}
         run.end()
-        return self._conclude(context, run.batch.outcomes)
+        return self.conclude(context, run.batch)
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Called by Blender when it drops the operator, as when another file is opened."""
@@ -106,7 +121,23 @@ class RunsFits(FitOptions):
         self.report({"ERROR"}, sentence)
         return {"CANCELLED"}
 
-    def _conclude(self, context: bpy.types.Context, outcomes: list[Outcome]) -> set[str]:
+
+class RunsFits(FitOptions, RunsWork):
+    """What the operators that fit have in common; each says in `apply` what it does at the end."""
+
+    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
+        """Changes the data-blocks; returns a sentence instead when they are no longer there."""
+        raise TypeError(f"{type(self).__name__} does not say what becomes of its fits")
+
+    def fit(self, context: bpy.types.Context, paths: Sequence[str]) -> set[str]:
+        """Fits the files."""
+        problem = native.problem()
+        if problem:
+            return self.refuse(problem)
+        return self.start(context, Batch(paths, self.fit_options()))
+
+    def conclude(self, context: bpy.types.Context, work: Batch) -> set[str]:
+        outcomes = work.outcomes
         done = [outcome for outcome in outcomes if outcome.record]
         for outcome in outcomes:
             if outcome.problem:

@@ -9,7 +9,14 @@ import lobefit._native
 import lobefit.preview
 import pytest
 
-OPERATORS = ["cancel_fit", "fit", "import_measured", "preview"]
+OPERATORS = [
+    "cancel_fit",
+    "fit",
+    "import_measured",
+    "preview",
+    "restore_scene",
+    "simplify_scene",
+]
 
 
 class Recorder:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lobefit._native import InputError
 from lobefit.atomic import written_aside
+from lobefit.inputs import Progress
 from lobefit.record import Record
 
 KINDS = ("measured", "lobe", "live", "principled", "auto")
@@ -23,6 +24,9 @@ _MODULES = ("bpy", "lobefit_addon")
 def has_blender() -> bool:
     """Whether Blender's Python module and the add-on are there."""
     return all(importlib.util.find_spec(module) for module in _MODULES)
+
+
+_POLL = 0.1  # seconds between two looks at work under way
 
 
 def need_blender() -> None:
@@ -82,6 +86,74 @@ def costs(record: Record) -> dict[tuple[str, int | None], float]:
             materials[kind, count] = build_material(record, kind=kind, count=count)
         measured = measure_costs(materials, "world", rounds=5, samples=16)
     return {way: cost.seconds for way, cost in measured.items()}
+
+
+def simplify(
+    path: str | os.PathLike[str],
+    output: str | os.PathLike[str] | None,
+    tolerance: float,
+    frames: int,
+    diffuse_bounces: bool = False,
+    timed: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Simplifies the measured materials of a Blender file's scene; returns what was done.
+
+    `tolerance` is a part of the picture's light. Nothing is written where `output` is None. Raises
+    InputError for a file that cannot be read, or whose scene has no camera to look through.
+    """
+    _open(path)
+    import bpy
+    from lobefit_addon.simplification import simplify as simplify_scene
+    from lobefit_addon.survey import Survey
+
+    survey = Survey(bpy.context, frames)
+    try:
+        while not survey.advance(_POLL):
+            if progress:
+                progress(survey.progress, survey.text)
+    finally:
+        survey.stop()
+    if survey.problem:
+        raise InputError(f"{path}: {survey.problem}")
+    with quiet():
+        result: dict[str, Any] = simplify_scene(
+            bpy.context, survey, tolerance, diffuse_bounces, timed
+        )
+    if output is not None:
+        _save(output)
+    return result
+
+
+def restore(path: str | os.PathLike[str], output: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """Puts back what simplified materials of a Blender file showed; returns their names."""
+    _open(path)
+    import bpy
+    from lobefit_addon.simplification import restore_all
+
+    result: dict[str, Any] = restore_all(bpy.context)
+    if output is not None:
+        _save(output)
+    return result
+
+
+def _open(path: str | os.PathLike[str]) -> None:
+    if not Path(path).is_file():
+        raise InputError(f"{path}: expected a Blender file, found no such file.")
+    import bpy
+
+    with quiet():
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(Path(path).absolute()), load_ui=False)
+        except RuntimeError as error:
+            raise InputError(
+                f"{path}: expected a Blender file, found one that cannot be opened, "
+                f"{_one_line(error)}."
+            ) from error
+
+
+def _one_line(error: RuntimeError) -> str:
+    return " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
 
 
 def _two_lights_scene(records: list[Record], size: int, kind: str, **options: Any) -> Any:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from lobefit import _native, blender, picture, pictures, preview, report
+from lobefit import _native, blender, picture, pictures, preview, report, simplified
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
@@ -102,6 +102,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_closures,
         _add_preview,
         _add_material,
+        _add_simplify,
         _add_report,
     ):
         add(commands)
@@ -225,6 +226,42 @@ def _add_material(commands: Any) -> None:
     _add_closure_options(command)
     _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
     command.add_argument("-o", dest="output", required=True, metavar="OUT.blend")
+
+
+def _add_simplify(commands: Any) -> None:
+    command = _add(
+        commands, _simplify, "leave out of materials what the scene of a file does not need"
+    )
+    command.add_argument("file", metavar="FILE.blend")
+    command.add_argument(
+        "--tolerance",
+        type=_within(float, 0, 100, "a percentage"),
+        default=1.0,
+        metavar="PERCENT",
+        help="of the picture's light that may change on any sampled frame; " + _DEFAULT,
+    )
+    command.add_argument(
+        "--frames",
+        type=_within(int, 1, 10000, "a number"),
+        default=8,
+        metavar="N",
+        help="how many to look at, evenly spread; " + _DEFAULT,
+    )
+    command.add_argument(
+        "--diffuse-bounces",
+        action="store_true",
+        help="show only a diffuse closure to light that bounced off a diffuse surface",
+    )
+    command.add_argument(
+        "--time", action="store_true", help="render the current frame before and after"
+    )
+    command.add_argument(
+        "--restore", action="store_true", help="put back what was shown before, and nothing else"
+    )
+    command.add_argument(
+        "-o", dest="output", metavar="OUT.blend", help="without it nothing is written"
+    )
+    _add_json(command)
 
 
 def _add_report(commands: Any) -> None:
@@ -383,6 +420,29 @@ def _material(options: argparse.Namespace) -> int:
     record = _record(Path(options.file), options, requests)
     count = options.closures if options.kind in TARGETS else None
     blender.write_blend(options.output, record, options.kind, count=count, tolerance=tolerance)
+    return DONE
+
+
+def _simplify(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    if options.output is not None:
+        place_to_write(options.output)
+    if options.restore:
+        result = blender.restore(options.file, options.output)
+        lines = simplified.restored_lines(result)
+    else:
+        with progress_bar(Path(options.file).name) as progress:
+            result = blender.simplify(
+                options.file,
+                options.output,
+                options.tolerance / 100,
+                options.frames,
+                options.diffuse_bounces,
+                options.time,
+                progress,
+            )
+        lines = simplified.lines(result)
+    print(json.dumps(result) if options.json else "\n".join(lines))
     return DONE
 
 
