@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from .nodes.material import BAKED
 from .records import BOUNCES_KEY, KEY
@@ -156,15 +157,23 @@ def _change(material: bpy.types.Material, choice: Choice, diffuse_bounces: bool)
     return not same
 
 
-def _sums(choices: list[Choice]) -> dict[str, float]:
-    """Errors of the worst frame, and the closures saved in a pixel of the picture on average."""
-    zero = np.zeros(1)
-    saved = (float(c.share.mean()) * (c.subject.now.cost - c.way.cost) for c in choices)
+def _sums(choices: list[Choice]) -> dict[str, Any]:
+    """Errors of the worst frame, and the closures drawn in a pixel of the picture on average."""
+
+    def worst(errors: list[NDArray[np.float64]]) -> float:
+        return float(np.sum(errors, axis=0).max()) if errors else 0.0
+
+    shares = [float(choice.share.mean()) for choice in choices]
+    before = [choice.subject.now.cost for choice in choices]
+    after = [choice.way.cost for choice in choices]
     return {
-        "error_added": float(sum((c.added for c in choices), zero).max()),
-        "error": float(sum((c.error for c in choices), zero).max()),
-        "error_before": float(sum((c.error_before for c in choices), zero).max()),
-        "closures_saved": sum(saved),
+        "error_added": worst([choice.added for choice in choices]),
+        "error": worst([choice.error for choice in choices]),
+        "error_before": worst([choice.error_before for choice in choices]),
+        "closures": {
+            "before": float(np.dot(shares, before)),
+            "after": float(np.dot(shares, after)),
+        },
     }
 
 

@@ -1,5 +1,6 @@
 """The extension as a whole: its coming and going, its panel, a module that is missing."""
 
+import json
 import sys
 from types import SimpleNamespace
 
@@ -144,6 +145,35 @@ def test_panel_shows_the_preview(addon, material):
     titles = ["Measured", "As in Cycles", f"Error x{lobefit.preview.AMPLIFIED}"]
     assert draw_panel(material=material).texts[-3:] == titles
     assert titles[0] not in draw_panel(material=bpy.data.materials.new("other")).texts
+
+
+def drawn(panel):
+    """A panel of the Render tab, drawn."""
+
+    class Drawn(SimpleNamespace):
+        draw = panel.draw
+
+    layout = Recorder()
+    Drawn(layout=layout).draw(bpy.context)
+    return layout
+
+
+def test_panel_of_the_scene(addon, material):
+    panel = bpy.types.LOBEFIT_PT_simplify_scene
+    assert drawn(panel).operators == ["simplify_scene"]
+    # Without its file the record is not given closures, which would take time.
+    record = json.loads(material["lobefit_record"])
+    record["source"]["path"] = None
+    material["lobefit_record"] = json.dumps(record)
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.object.camera_add(location=(0, 0, 9), rotation=(0, 0, 0))
+    bpy.context.scene.camera = bpy.context.object
+    bpy.ops.lobefit.simplify_scene()
+    layout = drawn(panel)
+    assert layout.operators == ["simplify_scene", "restore_scene"]
+    assert layout.properties == ["tolerance", "frames", "diffuse_bounces", "timed"]
+    assert f"{material.name}: live > principled" in layout.texts
 
 
 def test_without_the_compiled_module(native, monkeypatch, measured_file):

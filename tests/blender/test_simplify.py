@@ -275,7 +275,7 @@ def test_the_picture_loses_no_more_than_was_asked(
     best = rendered(two_lights, small_scene, frames)
     fill.fill_material(live, records["violet-rubber"], "live")
     small_scene.frame_set(7)
-    survey, saved = looked_at(addon), []
+    survey, drawn = looked_at(addon), []
     for tolerance in (0.01, 0.05):
         result = simplification.simplify(bpy.context, survey, tolerance)
         assert small_scene.frame_current == 7
@@ -286,18 +286,14 @@ def test_the_picture_loses_no_more_than_was_asked(
             np.abs(picture - reference).sum() / reference.sum()
             for picture, reference in zip(pictures, best, strict=True)
         ]
-        print(
-            "FIG", tolerance, result["error"], result["error_added"], lost, result["closures_saved"]
-        )
-        for r in result["materials"]:
-            print("FIG", r)
-        assert max(lost) < tolerance
-        saved.append(result["closures_saved"])
+        # What is told is what light from all sides would show, and here it is what suns do.
+        assert max(lost) < result["error_added"] <= tolerance
+        drawn.append(result["closures"]["after"])
         rows = {row["material"]: row for row in result["materials"]}
         assert rows["unseen"]["angles"] is None and rows["unseen"]["share"] == 0
         assert rows["unseen"]["after"]["count"] == 1
         assert rows["floor"]["share"] > rows["far"]["share"] > 0
-    assert saved[0] < saved[1]
+    assert drawn[0] > drawn[1]
 
 
 def contents(budget, material):
@@ -357,7 +353,7 @@ def test_other_renderers_see_no_change(two_spheres):
         assert [n.target for n in outputs if n.is_active_output] == ["ALL"]
 
 
-def test_the_result_is_kept_and_shown(simplification, two_spheres):
+def test_the_result_is_kept(simplification, two_spheres):
     bpy.ops.lobefit.simplify_scene(tolerance=2)
     result = simplification.result_of(bpy.context.scene)
     assert result == json.loads(json.dumps(result))
@@ -371,18 +367,6 @@ def test_the_result_is_kept_and_shown(simplification, two_spheres):
     assert metal["angles"] == pytest.approx(list(expected), abs=2)
     assert result["error_added"] <= 0.02
     assert result["seconds"] == {"before": None, "after": None}
-    layout = importlib.import_module("test_extension").Recorder()
-    panel = bpy.types.LOBEFIT_PT_simplify_scene
-
-    class Drawn:
-        draw = panel.draw
-
-    drawn = Drawn()
-    drawn.layout = layout
-    drawn.draw(bpy.context)
-    assert layout.operators == ["simplify_scene", "restore_scene"]
-    assert layout.properties == ["tolerance", "frames", "diffuse_bounces", "timed"]
-    assert any(text.startswith("metal: measured 3 > measured") for text in layout.texts)
 
 
 def test_rendering_is_timed(simplification, two_spheres):

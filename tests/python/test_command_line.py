@@ -229,3 +229,56 @@ def test_a_reader_that_goes_away_is_no_error(table):
     command = f"'{sys.executable}' -m lobefit info --json {f'{table} ' * 3}| head -c 5"
     ended = subprocess.run(command, shell=True, capture_output=True, timeout=60, check=True)
     assert ended.stderr == b""
+
+
+@pytest.fixture(scope="module")
+def blend(tmp_path_factory, table) -> Path:
+    """A Blender file: a sphere with a measured material before a camera, and a sun."""
+    import bpy
+    from lobefit import closures
+    from lobefit_addon import build_material
+
+    record = closures(table, count=1)
+    for count in (0, 2, 3):
+        record = closures(record, count=count)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.context.object.data.materials.append(build_material(record, "measured", "truth"))
+    bpy.ops.object.camera_add(location=(0, 0, 9), rotation=(0, 0, 0))
+    bpy.context.scene.camera = bpy.context.object
+    bpy.ops.object.light_add(type="SUN")
+    path = tmp_path_factory.mktemp("scene") / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_simplify_and_restore(tmp_path, blend, capfd):
+    out, back = tmp_path / "out.blend", tmp_path / "back.blend"
+    before = blend.read_bytes()
+    arguments = ["--tolerance", "20", "--frames", "2"]
+    assert main(["simplify", str(blend), *arguments, "--json", "-o", str(out)]) == 0
+    (line,) = capfd.readouterr().out.splitlines()
+    result = json.loads(line)
+    assert result["frames"] == [1, 250]
+    assert result["lights"] == {"Sun": 1}
+    assert result["error_added"] <= 0.2
+    (row,) = result["materials"]
+    assert row["before"]["count"] > row["after"]["count"]
+    assert main(["simplify", str(out), "--restore", "-o", str(back)]) == 0
+    assert capfd.readouterr().out == "truth: restored\n"
+    assert main(["simplify", str(back), *arguments, "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["materials"] == result["materials"]
+    assert blend.read_bytes() == before
+    assert main(["simplify", str(back), *arguments]) == 0
+    table = capfd.readouterr().out.splitlines()
+    assert table[0].split()[:3] == ["material", "before", "after"]
+    assert table[1].startswith("truth ")
+    assert table[-1] == "lit by 1 Sun"
+
+
+def test_simplify_refuses_what_it_cannot_do(tmp_path, blend, capfd):
+    assert "no such file" in refuse(capfd, "simplify", tmp_path / "gone.blend")
+    text = written(tmp_path / "text.blend", b"no Blender file")
+    assert "cannot be opened" in refuse(capfd, "simplify", text)
+    assert "a percentage" in refuse(capfd, "simplify", blend, "--tolerance", "-1")
+    assert "folder" in refuse(capfd, "simplify", blend, "-o", tmp_path)

@@ -4,7 +4,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -147,8 +147,8 @@ def _open(path: str | os.PathLike[str]) -> None:
             bpy.ops.wm.open_mainfile(filepath=str(Path(path).absolute()), load_ui=False)
         except RuntimeError as error:
             raise InputError(
-                f"{path}: expected a Blender file, found one that cannot be opened, "
-                f"{_one_line(error)}."
+                f"{path}: expected a Blender file, found one that cannot be opened "
+                f"({_one_line(error)})."
             ) from error
 
 
@@ -186,9 +186,10 @@ def quiet() -> Iterator[None]:
     sys.stdout.flush()
     ours = os.dup(1)
     try:
-        with Path(os.devnull).open("w") as nowhere:
+        # Operators tell their reports through Python, the rest of Blender by itself.
+        with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere):
             os.dup2(nowhere.fileno(), 1)
-        yield
+            yield
     finally:
         os.dup2(ours, 1)
         os.close(ours)

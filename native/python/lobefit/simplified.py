@@ -18,7 +18,10 @@ def lines(result: Mapping[str, Any]) -> list[str]:
         f"{result['error']:.3%} is then off at most against the measurements, before "
         f"{result['error_before']:.3%}"
     )
-    told.append(f"{result['closures_saved']:.2f} closures saved in a pixel on average")
+    drawn = result["closures"]
+    told.append(
+        f"{drawn['after']:.2f} closures in a pixel on average, before {drawn['before']:.2f}"
+    )
     seconds = result["seconds"]
     if seconds["after"] is not None:
         told.append(f"rendered in {seconds['after']:.2f} s, before in {seconds['before']:.2f} s")
