@@ -1,6 +1,7 @@
 #include "closures/microfacet.h"
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 

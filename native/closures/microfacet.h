@@ -2,7 +2,6 @@
 // normal and roughness of its own along the plane of incidence and across it.
 #pragma once
 
-#include <cmath>
 #include <string_view>
 
 #include "measurement/vector3.h"
@@ -32,14 +31,6 @@ struct ShapeValue {
   double by_log_alpha_y = 0;
   double by_tilt = 0;
 };
-
-// Cycles' rational approximation of Smith's Lambda for the Beckmann distribution (Walter et al.
-// 2007, eq. 15), for q = (alpha tan theta)^2.
-inline double beckmann_lambda(double q) {
-  if (q < 0.39) return 0;
-  const double c = 1 / std::sqrt(q);
-  return (1 - 1.259 * c + 0.396 * c * c) / (3.535 * c + 2.181 * c * c);
-}
 
 // A closure seen under one view angle from the normal n = +z, the viewer in the xz plane at x > 0.
 //
