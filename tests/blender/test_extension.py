@@ -1,6 +1,5 @@
 """The extension as a whole: its coming and going, its panel, a module that is missing."""
 
-import json
 import sys
 from types import SimpleNamespace
 
@@ -162,9 +161,9 @@ def test_panel_of_the_scene(addon, material):
     panel = bpy.types.LOBEFIT_PT_simplify_scene
     assert drawn(panel).operators == ["simplify_scene"]
     # Without its file the record is not given closures, which would take time.
-    record = json.loads(material["lobefit_record"])
-    record["source"]["path"] = None
-    material["lobefit_record"] = json.dumps(record)
+    record = lobefit.Record.from_json(material["lobefit_record"])
+    record.source["path"], record.closures = None, []
+    addon.nodes.material.fill_material(material, record, "live")
     bpy.ops.mesh.primitive_uv_sphere_add()
     bpy.context.object.data.materials.append(material)
     bpy.ops.object.camera_add(location=(0, 0, 9), rotation=(0, 0, 0))
