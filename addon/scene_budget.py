@@ -32,6 +32,7 @@ OTHER_ALBEDO = 0.18
 DIFFUSE_COST, PRINCIPLED_COST, LIVE_COST = 0.25, 2.5, 5.0
 
 _ANGLES = np.arange(DEGREES) + 0.5
+_COMPARED = ".lobefit as built"  # a material that is there only to be compared with
 
 
 @dataclass(frozen=True)
@@ -301,16 +302,22 @@ def problem_of(material: bpy.types.Material) -> str:
 
 def is_as_built(material: bpy.types.Material, record: Any, way: Way, bounces: bool) -> bool:
     """Whether the nodes are still those of the record, so that nothing of a user's is lost."""
-    groups = set(bpy.data.node_groups)
+    groups = {group.session_uid for group in bpy.data.node_groups}
+    # With its own name it takes the place of no group of the user's.
     built = build_material(
-        record, way.kind, count=way.count if way.kind in BAKED else None, diffuse_bounces=bounces
+        record,
+        way.kind,
+        name=_COMPARED,
+        count=way.count if way.kind in BAKED else None,
+        diffuse_bounces=bounces,
     )
     try:
         return tree_content(built.node_tree) == tree_content(material.node_tree)
     finally:
         bpy.data.materials.remove(built)
-        for group in set(bpy.data.node_groups) - groups:
-            bpy.data.node_groups.remove(group)
+        for group in list(bpy.data.node_groups):
+            if group.session_uid not in groups:
+                bpy.data.node_groups.remove(group)
 
 
 def tree_content(tree: bpy.types.NodeTree) -> tuple[Any, ...]:

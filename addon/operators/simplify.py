@@ -37,6 +37,8 @@ class LOBEFIT_OT_simplify_scene(SimplifyOptions, RunsWork, bpy.types.Operator):
         result = simplify(context, work, self.tolerance / 100, self.diffuse_bounces, self.timed)
         for item in result["skipped"]:
             self.report({"WARNING"}, f"{item['material']}: left as it is, {item['reason']}")
+        if self.timed and result["seconds"]["after"] is None:
+            self.report({"WARNING"}, "Rendering is timed in Cycles only")
         if not result["materials"]:
             return self.refuse("Expected a measured material in the scene, found none to simplify.")
         changed = sum(row["changed"] for row in result["materials"])

@@ -442,6 +442,8 @@ def _simplify(options: argparse.Namespace) -> int:
                 progress,
             )
         lines = simplified.lines(result)
+        if options.time and result["seconds"]["after"] is None:
+            _complain("rendering is timed in Cycles only, found a scene of another renderer.")
     print(json.dumps(result) if options.json else "\n".join(lines))
     return DONE
 
