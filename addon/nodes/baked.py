@@ -77,7 +77,7 @@ class _Group:
         geometry = formulas.node("ShaderNodeNewGeometry")
         incoming = Vector(formulas, geometry.outputs["Incoming"])
         self.cosine = incoming.dot(self.normal).named("cos theta")
-        self.across = (incoming - self.normal * self.cosine).named("toward the viewer")
+        self.incoming = incoming
         self.tangent = (incoming + TINY_TANGENT).named("tangent")
 
     def _specular(self, specular: Mapping[str, Any]) -> bpy.types.NodeSocket:
@@ -87,7 +87,7 @@ class _Group:
         )
         normal = self.normal
         if isinstance(bend, Scalar) or bend != 0.0:
-            normal = self.across.times_plus(bend, self.normal).named("bent normal")
+            normal = self.incoming.times_plus(bend, self.normal).named("bent normal")
         inputs = {"Roughness": roughness, "Anisotropy": anisotropy, "Normal": normal}
         if isinstance(anisotropy, Scalar) or anisotropy != 0.0:
             inputs["Tangent"] = self.tangent

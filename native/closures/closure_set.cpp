@@ -13,18 +13,19 @@ Rgb at(const RgbCurve& curve, double cosine) {
 
 }  // namespace
 
-ClosureSockets to_sockets(const Shape& shape, double sine) {
+ClosureSockets to_sockets(const Shape& shape, const Vector3& wo) {
   const double ratio = std::exp((shape.log_alpha_x - shape.log_alpha_y) / 2);
   return {std::exp((shape.log_alpha_x + shape.log_alpha_y) / 4),
-          ratio <= 1 ? 1 - ratio : 1 / ratio - 1, sine > 0 ? shape.tilt / sine : 0};
+          ratio <= 1 ? 1 - ratio : 1 / ratio - 1,
+          wo.x() > 0 ? shape.tilt / (wo.x() - shape.tilt * wo.z()) : 0};
 }
 
-Shape to_shape(const ClosureSockets& sockets, double sine) {
+Shape to_shape(const ClosureSockets& sockets, const Vector3& wo) {
   const double log_alpha = 2 * std::log(std::clamp(sockets.roughness, 1e-6, 1.0));
   const double anisotropy = std::clamp(sockets.anisotropy, -0.99, 0.99);
   const double half_ratio = -std::copysign(std::log1p(-std::abs(anisotropy)), anisotropy);
   return {std::min(log_alpha + half_ratio, 0.0), std::min(log_alpha - half_ratio, 0.0),
-          sockets.bend * sine};
+          sockets.bend * wo.x() / (1 + sockets.bend * wo.z())};
 }
 
 ClosuresAtView::ClosuresAtView(const ClosureSet& closures, const Vector3& wo)
@@ -35,7 +36,7 @@ ClosuresAtView::ClosuresAtView(const ClosureSet& closures, const Vector3& wo)
     const Rgb weight = at(specular.weight, cosine);
     if (weight.mean() < least_weight) continue;
     const Shape shape = to_shape(
-        {specular.roughness(cosine), specular.anisotropy(cosine), specular.bend(cosine)}, wo.x());
+        {specular.roughness(cosine), specular.anisotropy(cosine), specular.bend(cosine)}, wo);
     specular_.emplace_back(Microfacet(specular.distribution, shape, wo), weight);
   }
 }

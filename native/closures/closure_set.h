@@ -14,7 +14,7 @@ namespace lobefit {
 using RgbCurve = std::array<ViewCurve, 3>;
 
 // One GGX or Beckmann closure, in the terms of its node: Roughness and Anisotropy with the tangent
-// in the plane of incidence, and the closure's normal n + bend (wo - (n.wo) n), not normalised.
+// in the plane of incidence, and the closure's normal n + bend wo, not normalised.
 struct SpecularClosure {
   Distribution distribution = Distribution::ggx;
   ViewCurve roughness, anisotropy, bend;
@@ -27,16 +27,16 @@ struct ClosureSet {
   std::vector<SpecularClosure> specular;
 };
 
-// Cycles' sockets of a shape seen at some angle whose sine is given, and back. Roughness is
-// sqrt(alpha), Anisotropy 1 - sqrt(alpha_x / alpha_y) or its negative counterpart; where one alpha
-// would exceed 1, Cycles clips it.
+// Cycles' sockets of a shape seen from wo (in the xz plane), and back. Roughness is sqrt(alpha),
+// Anisotropy 1 - sqrt(alpha_x / alpha_y) or its negative counterpart; where one alpha would exceed
+// 1, Cycles clips it. No bend reaches the viewer: the tilt has to be less than wo.x / wo.z.
 struct ClosureSockets {
   double roughness;
   double anisotropy;
   double bend;
 };
-ClosureSockets to_sockets(const Shape& shape, double sine);
-Shape to_shape(const ClosureSockets& sockets, double sine);
+ClosureSockets to_sockets(const Shape& shape, const Vector3& wo);
+Shape to_shape(const ClosureSockets& sockets, const Vector3& wo);
 
 // Closures seen from one angle, with all curves read.
 class ClosuresAtView {

@@ -86,10 +86,8 @@ double least_tilt(double cosine) {
   const double least_height = std::min(0.9 * cosine, 0.0105);
   return -std::tan((std::asin(cosine) - std::asin(least_height)) / 2);
 }
-// The viewer stays above the closure's own horizon.
-double greatest_tilt(double cosine, double sine) {
-  return 0.9 * (1 + sine) / std::max(cosine, 0.02);
-}
+// No bend reaches the viewer itself.
+double greatest_tilt(double cosine, double sine) { return 0.8 * sine / cosine; }
 
 // A shape within what Cycles can show, and which of its numbers were clipped.
 struct ClippedShape {
@@ -512,7 +510,7 @@ ClosureSet to_closures(const Problem& problem, const Eigen::VectorXd& x, double 
       return [&, k, socket](double cosine) {
         const double inside = std::clamp(cosine, 1e-3, 1 - 1e-6);
         const AtView at = at_view(x, inside);
-        return to_sockets(shape_at(at, layout, k, inside).shape, at.sine).*socket;
+        return to_sockets(shape_at(at, layout, k, inside).shape, {at.sine, 0, inside}).*socket;
       };
     };
     SpecularClosure closure;

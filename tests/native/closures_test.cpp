@@ -178,10 +178,16 @@ TEST(Closures, SocketsAndShapesAreInverse) {
   std::uniform_real_distribution<double> part(0, 1);
   for (int i = 0; i < 1000; ++i) {
     // An anisotropy of 0.99 is the most that the node takes: alphas 1e4 apart.
-    const Shape shape{-4 * part(random), -4 * part(random), 2 * part(random) - 1};
-    const double sine = 0.01 + 0.99 * part(random);
-    const ClosureSockets sockets = to_sockets(shape, sine);
-    const Shape back = to_shape(sockets, sine);
+    const double angle = 0.01 + 1.55 * part(random);
+    const Vector3 wo(std::sin(angle), 0, std::cos(angle));
+    const double tilt = std::min(2 * part(random) - 1, 0.8 * wo.x() / wo.z());
+    const Shape shape{-4 * part(random), -4 * part(random), tilt};
+    const ClosureSockets sockets = to_sockets(shape, wo);
+    const Shape back = to_shape(sockets, wo);
+    // The normal is tilted as that of the shape: n + bend wo is along (tilt, 0, 1).
+    const Vector3 normal = Vector3::UnitZ() + sockets.bend * wo;
+    EXPECT_NEAR(normal.x(), tilt * normal.z(), 1e-12);
+    EXPECT_GT(normal.z(), 0);
     EXPECT_NEAR(back.log_alpha_x, shape.log_alpha_x, 1e-12);
     EXPECT_NEAR(back.log_alpha_y, shape.log_alpha_y, 1e-12);
     EXPECT_NEAR(back.tilt, shape.tilt, 1e-12);
@@ -192,14 +198,15 @@ TEST(Closures, SocketsAndShapesAreInverse) {
 TEST(Closures, SocketsAreThoseOfTheNode) {
   // alpha = Roughness^2; with Anisotropy A >= 0 it is times (1 - A) along the tangent, over (1 - A)
   // across it, and the other way round for A < 0; what exceeds 1 is clipped.
-  const Shape along = to_shape({0.5, 0.5, 0}, 0.6), across = to_shape({0.5, -0.5, 2}, 0.6);
+  const Vector3 wo(0.6, 0, 0.8);
+  const Shape along = to_shape({0.5, 0.5, 0}, wo), across = to_shape({0.5, -0.5, 2}, wo);
   EXPECT_NEAR(std::exp(along.log_alpha_x), 0.125, 1e-12);
   EXPECT_NEAR(std::exp(along.log_alpha_y), 0.5, 1e-12);
   EXPECT_NEAR(std::exp(across.log_alpha_x), 0.5, 1e-12);
   EXPECT_NEAR(std::exp(across.log_alpha_y), 0.125, 1e-12);
-  EXPECT_NEAR(across.tilt, 1.2, 1e-12);
-  EXPECT_EQ(to_shape({0.9, 0.8, 0}, 0.6).log_alpha_y, 0);
-  EXPECT_EQ(to_sockets({-1, -1, 0.3}, 0).bend, 0);
+  EXPECT_NEAR(across.tilt, 1.2 / 2.6, 1e-12);
+  EXPECT_EQ(to_shape({0.9, 0.8, 0}, wo).log_alpha_y, 0);
+  EXPECT_EQ(to_sockets({-1, -1, 0.3}, Vector3::UnitZ()).bend, 0);
 }
 
 TEST(Closures, TheViewMayStandAnywhere) {
