@@ -5,27 +5,38 @@ MATERIAL --merl FILE --json OUT): `measured` with 1, 2 and 3 specular closures, 
 Principled BSDF, and `lobe` with 2 closures, the last against the fitted lobe itself. With --lobes
 in place of files it is the published grid of lobes (exponent, interpolation, with and without
 Fresnel). --offset shifts the judge's phases; each further --python (an interpreter with another
-bpy) renders the same files, and the largest difference of its figures is printed.
+bpy) renders the same files, and the largest difference of its figures is printed. The column FLIP,
+a figure nearer to the eye, is the mean HDR-FLIP (Andersson et al. 2021) of the same pictures, black
+surroundings included, at its defaults: 0 is what no eye tells apart, 1 the most. It takes the worst
+of many exposures, up to one that shows the darker half of a picture: of a metal under one sun that
+is thousands of times darker than the highlight, and rules the figure.
 """
 
 import argparse
+import importlib.util
 import json
 import statistics
 import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import bpy
+import flip_evaluator
 import lobefit
+import numpy as np
+from lobefit.blender import quiet
 from lobefit_addon import build_material
 
 EXPONENTS = (1.0, 5.0, 10.0, 30.0, 100.0, 500.0, 5000.0)
 INTERPOLATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 IORS = (None, 1.5)
 LOBE_KEYS = ("diffuse", "specular", "exponent", "interpolation", "ior")
+SIZE = 96  # pixels of the judge's spheres
 
 
 @dataclass
@@ -104,6 +115,33 @@ def judge(python: str, script: Path, blend: Path, case: Case, offset: float) -> 
         return json.loads(out.read_text())
 
 
+def module_of(script: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("judge", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def flip_of(module: ModuleType, blend: Path, case: Case, offset: float) -> float:
+    """The mean HDR-FLIP over the judge's phases."""
+    phases = [phase + offset for phase in module.PHASES]
+    option, value = case.reference
+    if option == "--merl":
+        table = module.read_merl(value)
+        reference = partial(module.lookup, table)
+    else:
+        reference = partial(module.interpolated_lobe, **json.loads(value))
+    with quiet():
+        images = module.render_spheres(str(blend), case.name, SIZE, phases)
+    _, references = module.compare(images, reference, SIZE, phases)
+    pairs = [
+        [image.reshape(SIZE, SIZE, 3).astype(np.float32) for image in pair]
+        for pair in zip(references, images, strict=True)
+    ]
+    means = [flip_evaluator.evaluate(*pair, "HDR", applyMagma=False)[1] for pair in pairs]
+    return statistics.mean(means)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="*", type=Path)
@@ -122,17 +160,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         blend = Path(folder) / "materials.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-        print("| material | sphere error | grazing | worst (phase) | r, g, b | predicted | s |")
-        print("|---" * 7 + "|")
+        print(
+            "| material | sphere error | grazing | worst (phase) | r, g, b | FLIP | predicted | s |"
+        )
+        print("|---" * 8 + "|")
+        module = module_of(options.judge)
         found = {}
         for case in cases:
             told = judge(sys.executable, options.judge, blend, case, options.offset)
             found[case.name] = told["sphere_error"]
+            flip = flip_of(module, blend, case, options.offset)
             worst, channels = told["worst"], ", ".join(f"{e:.3f}" for e in told["channels"])
             print(
                 f"| {case.name} | {told['sphere_error']:.4f} | {told['grazing']:.3f} | "
-                f"{worst['error']:.3f} ({worst['phase']:g}) | {channels} | {case.predicted:.4f} | "
-                f"{case.seconds:.2f} |",
+                f"{worst['error']:.3f} ({worst['phase']:g}) | {channels} | {flip:.4f} | "
+                f"{case.predicted:.4f} | {case.seconds:.2f} |",
                 flush=True,
             )
         for python in options.python:
