@@ -1,6 +1,5 @@
 #include "closures/closure_set.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -49,11 +48,7 @@ Rgb ClosuresAtView::evaluate(const Vector3& wi, const Vector3& half) const {
 
 Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo) {
   if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
-  const double sine = std::hypot(wo.x(), wo.y());
-  // Turned about the normal so that the viewer is in the xz plane.
-  const double c = sine > 0 ? wo.x() / sine : 1, s = sine > 0 ? wo.y() / sine : 0;
-  const Vector3 light(c * wi.x() + s * wi.y(), c * wi.y() - s * wi.x(), wi.z());
-  const Vector3 viewer(sine, 0, wo.z());
+  const auto [light, viewer] = turned_to_viewer(wi, wo);
   return ClosuresAtView(closures, viewer).evaluate(light, (light + viewer).normalized());
 }
 

@@ -110,8 +110,6 @@ ClippedShape shape_at(const AtView& at, const Layout& layout, int closure, doubl
   return result;
 }
 
-double square(double x) { return x * x; }
-
 // |r| made smooth, sqrt(r^2 + e^2) - e, without loss of digits where r is small.
 double smooth(double r, double e) { return r * r / (std::sqrt(r * r + e * e) + e); }
 

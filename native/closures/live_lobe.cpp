@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "closures/beckmann.h"
+#include "closures/microfacet.h"
 
 namespace lobefit {
 namespace {
@@ -28,8 +28,6 @@ struct Correction {
 // (ln F)' of Fresnel pulls the peak toward the horizon, the light's cosine away from it; at least
 // this much of the latter is left.
 constexpr double least_pull = 0.05;
-
-double square(double x) { return x * x; }
 
 // F, half of (ln F)' / tan (phi) and (F - F0) / (F + F0), F0 at normal incidence (rise).
 struct Fresnel {
@@ -116,16 +114,11 @@ LiveClosures live_closures(double cos_view, double exponent, double interpolatio
 Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo) {
   if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
   const Parameters lobe = as_interpolated(parameters);
-  const Vector3 normal = Vector3::UnitZ();
-  const double sine = std::hypot(wo.x(), wo.y());
-  const Vector3 tangent =
-      sine > 0 ? Vector3(wo.x() / sine, wo.y() / sine, 0) : Vector3(Vector3::UnitX());
+  const auto [light, viewer] = turned_to_viewer(wi, wo);
+  const Vector3 half = (light + viewer).normalized();
   const auto evaluate = [&](const LiveClosure& closure) {
-    const double shrink = 1 / std::sqrt(1 + square(closure.tilt));
-    const Beckmann bent{(normal + closure.tilt * tangent) * shrink,
-                        (tangent - closure.tilt * normal) * shrink, closure.alpha_x,
-                        closure.alpha_y};
-    return closure.weight * evaluate_beckmann(bent, wi, wo);
+    const Shape shape{std::log(closure.alpha_x), std::log(closure.alpha_y), closure.tilt};
+    return closure.weight * Microfacet(Distribution::beckmann, shape, viewer).evaluate(light, half);
   };
   Rgb result = lobe.diffuse / pi * wi.z();
   for (int c = 0; c < 3; ++c) {

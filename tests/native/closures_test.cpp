@@ -166,7 +166,9 @@ TEST(ClosuresMicrofacet, ReflectsNoMoreThanItReceives) {
           }
           // Quadrature is off by a thousandth, and Beckmann's approximate Lambda by a little more.
           EXPECT_LT(albedo, 1.005) << alpha_x << ' ' << alpha_y << ' ' << angle;
-          EXPECT_GT(albedo, 0.3) << alpha_x << ' ' << alpha_y << ' ' << angle;
+          // Hardly any light is masked where the closure is smooth and faces the viewer.
+          const double least = std::max(alpha_x, alpha_y) < 0.1 && angle == 0 ? 0.99 : 0.3;
+          EXPECT_GT(albedo, least) << alpha_x << ' ' << alpha_y << ' ' << angle;
         }
       }
     }
@@ -178,8 +180,7 @@ TEST(Closures, SocketsAndShapesAreInverse) {
   std::uniform_real_distribution<double> part(0, 1);
   for (int i = 0; i < 1000; ++i) {
     // An anisotropy of 0.99 is the most that the node takes: alphas 1e4 apart.
-    const double angle = 0.01 + 1.55 * part(random);
-    const Vector3 wo(std::sin(angle), 0, std::cos(angle));
+    const Vector3 wo = at_angle(0.01 + 1.55 * part(random));
     const double tilt = std::min(2 * part(random) - 1, 0.8 * wo.x() / wo.z());
     const Shape shape{-4 * part(random), -4 * part(random), tilt};
     const ClosureSockets sockets = to_sockets(shape, wo);

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 #include <vector>
 
-#include "closures/beckmann.h"
 #include "reflectance/fresnel.h"
 
 namespace lobefit {
@@ -50,34 +50,6 @@ double relative_error(const Parameters& parameters, double view_angle) {
     }
   }
   return difference / total;
-}
-
-TEST(Beckmann, IntegratesToOneSeenAlongItsNormal) {
-  // Seen from above, rough 0.3: hardly any light is masked or leaves below the horizon.
-  const Beckmann closure{Vector3::UnitZ(), Vector3::UnitX(), 0.3, 0.2};
-  double sum = 0;
-  constexpr int steps = 400;
-  for (int i = 0; i < steps; ++i) {
-    for (int j = 0; j < steps; ++j) {
-      const double cosine = (i + 0.5) / steps;
-      const Vector3 wi = at_angle(std::acos(cosine), 2 * pi * (j + 0.5) / steps);
-      sum += evaluate_beckmann(closure, wi, Vector3::UnitZ()) * 2 * pi / (steps * steps);
-    }
-  }
-  EXPECT_NEAR(sum, 1, 0.01);
-}
-
-TEST(Beckmann, IsReciprocalButForTheCosine) {
-  const Beckmann closure{Vector3::UnitZ(), Vector3::UnitX(), 0.5, 0.2};
-  const Vector3 a = at_angle(1.2, 0.3), b = at_angle(0.7, 2.9);
-  // Rounding alone differs.
-  EXPECT_NEAR(evaluate_beckmann(closure, a, b) * b.z(), evaluate_beckmann(closure, b, a) * a.z(),
-              1e-14);
-}
-
-TEST(Beckmann, IsDarkBelowItsOwnHorizon) {
-  const Beckmann closure{at_angle(0.5), at_angle(0.5 + pi / 2), 0.3, 0.3};
-  EXPECT_EQ(evaluate_beckmann(closure, at_angle(-1.2), at_angle(0.2)), 0);
 }
 
 TEST(NormalAlbedo, IsTheIntegral) {
