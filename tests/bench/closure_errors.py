@@ -17,12 +17,11 @@ import importlib.util
 import json
 import statistics
 import subprocess
-import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import bpy
@@ -31,6 +30,7 @@ import lobefit
 import numpy as np
 from lobefit.blender import quiet
 from lobefit_addon import build_material
+from numpy.typing import NDArray
 
 EXPONENTS = (1.0, 5.0, 10.0, 30.0, 100.0, 500.0, 5000.0)
 INTERPOLATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -47,6 +47,18 @@ class Case:
     reference: list[str]
     predicted: float
     seconds: float = 0.0
+
+
+@dataclass
+class Verdict:
+    """The judge's figures of a material, and the mean HDR-FLIP of the same pictures."""
+
+    sphere_error: float
+    grazing: float  # phases from 130 degrees on
+    worst_phase: float
+    worst: float
+    channels: NDArray[np.float64]
+    flip: float
 
 
 def measured_cases(path: Path, counts: list[int]) -> list[Case]:
@@ -106,40 +118,52 @@ def blank_record(parameters: dict[str, Any]) -> lobefit.Record:
     )
 
 
-def judge(python: str, script: Path, blend: Path, case: Case, offset: float) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "out.json"
-        command = [python, script, blend, case.name, *case.reference, "--json", out]
-        command += ["--offset", str(offset)]
-        subprocess.run(list(map(str, command)), check=True, capture_output=True)
-        return json.loads(out.read_text())
+class Judge:
+    """The neutral judge of `script`, its phases shifted by `offset` degrees."""
+
+    def __init__(self, script: Path, offset: float) -> None:
+        self.script, self.offset = script, offset
+        spec = importlib.util.spec_from_file_location("judge", script)
+        self.module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(self.module)
+        self.read = lru_cache(maxsize=1)(self.module.read_merl)
+
+    def tell(self, blend: Path, case: Case) -> Verdict:
+        """Judges a material in this process."""
+        phases = [phase + self.offset for phase in self.module.PHASES]
+        with quiet():
+            images = self.module.render_spheres(str(blend), case.name, SIZE, phases)
+        errors, references = self.module.compare(images, self._reference(case), SIZE, phases)
+        pooled = {phase: error[0] for phase, error in errors.items()}
+        return Verdict(
+            sphere_error=statistics.mean(pooled.values()),
+            grazing=statistics.mean(error for phase, error in pooled.items() if phase >= 130),
+            worst_phase=max(pooled, key=pooled.get),
+            worst=max(pooled.values()),
+            channels=np.mean([error[1:] for error in errors.values()], axis=0),
+            flip=statistics.mean(map(flip, references, images)),
+        )
+
+    def sphere_error_in(self, python: str, blend: Path, case: Case) -> float:
+        """What the judge says when another interpreter, with a bpy of its own, renders."""
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "out.json"
+            command = [python, self.script, blend, case.name, *case.reference, "--json", out]
+            command += ["--offset", self.offset]
+            subprocess.run(list(map(str, command)), check=True, capture_output=True)
+            return json.loads(out.read_text())["sphere_error"]
+
+    def _reference(self, case: Case) -> Callable[..., NDArray[np.float64]]:
+        option, value = case.reference
+        if option == "--merl":
+            return partial(self.module.lookup, self.read(value))
+        return partial(self.module.interpolated_lobe, **json.loads(value))
 
 
-def module_of(script: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("judge", script)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def flip_of(module: ModuleType, blend: Path, case: Case, offset: float) -> float:
-    """The mean HDR-FLIP over the judge's phases."""
-    phases = [phase + offset for phase in module.PHASES]
-    option, value = case.reference
-    if option == "--merl":
-        table = module.read_merl(value)
-        reference = partial(module.lookup, table)
-    else:
-        reference = partial(module.interpolated_lobe, **json.loads(value))
-    with quiet():
-        images = module.render_spheres(str(blend), case.name, SIZE, phases)
-    _, references = module.compare(images, reference, SIZE, phases)
-    pairs = [
-        [image.reshape(SIZE, SIZE, 3).astype(np.float32) for image in pair]
-        for pair in zip(references, images, strict=True)
-    ]
-    means = [flip_evaluator.evaluate(*pair, "HDR", applyMagma=False)[1] for pair in pairs]
-    return statistics.mean(means)
+def flip(reference: NDArray[np.float64], image: NDArray[np.float64]) -> float:
+    """The mean HDR-FLIP of a picture."""
+    pair = [pixels.reshape(SIZE, SIZE, 3).astype(np.float32) for pixels in (reference, image)]
+    return flip_evaluator.evaluate(*pair, "HDR", applyMagma=False)[1]
 
 
 def main() -> None:
@@ -164,23 +188,21 @@ def main() -> None:
             "| material | sphere error | grazing | worst (phase) | r, g, b | FLIP | predicted | s |"
         )
         print("|---" * 8 + "|")
-        module = module_of(options.judge)
+        judge = Judge(options.judge, options.offset)
         found = {}
         for case in cases:
-            told = judge(sys.executable, options.judge, blend, case, options.offset)
-            found[case.name] = told["sphere_error"]
-            flip = flip_of(module, blend, case, options.offset)
-            worst, channels = told["worst"], ", ".join(f"{e:.3f}" for e in told["channels"])
+            told = judge.tell(blend, case)
+            found[case.name] = told.sphere_error
+            channels = ", ".join(f"{error:.3f}" for error in told.channels)
             print(
-                f"| {case.name} | {told['sphere_error']:.4f} | {told['grazing']:.3f} | "
-                f"{worst['error']:.3f} ({worst['phase']:g}) | {channels} | {flip:.4f} | "
+                f"| {case.name} | {told.sphere_error:.4f} | {told.grazing:.3f} | "
+                f"{told.worst:.3f} ({told.worst_phase:g}) | {channels} | {told.flip:.4f} | "
                 f"{case.predicted:.4f} | {case.seconds:.2f} |",
                 flush=True,
             )
         for python in options.python:
             apart = [
-                abs(judge(python, options.judge, blend, case, options.offset)["sphere_error"] - now)
-                for case, now in zip(cases, found.values(), strict=True)
+                abs(judge.sphere_error_in(python, blend, case) - found[case.name]) for case in cases
             ]
             print(f"{python}: largest difference {max(apart):.1e}", flush=True)
     print(f"median {statistics.median(found.values()):.4f}, worst {max(found.values()):.4f}")
