@@ -6,7 +6,7 @@ The sum over all materials is, at worst, the part of the picture's light that is
 comes from everywhere alike.
 
 Bounced light meets a material at every angle and is mixed before it is seen. So no kind is taken
-whose error over all angles exceeds `BOUNCE_TOLERANCE`, seen or not, unless none is better.
+that changes more than `BOUNCE_TOLERANCE` of the light over all angles, whether it is seen or not.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .scene_view import DEGREES, View
 from .ways import Way
 
-# Parts of the reflected light that may be off where only bounced light shows it.
+# The part of the reflected light that may change where only bounced light shows it.
 BOUNCE_TOLERANCE = 0.1
 # What surfaces that are not measured reflect: a photographer's grey. The darker they are taken to
 # be, the more the errors of the measured ones count.
@@ -116,9 +116,10 @@ def _light(subjects: Sequence[Subject], views: Sequence[View]) -> NDArray[np.flo
 
 
 def _sound_ways(subject: Subject) -> list[Way]:
-    """The ways that will do for bounced light too, and in any case one that adds nothing."""
-    limit = max(BOUNCE_TOLERANCE, min(way.error for way in subject.ways))
-    return [way for way in subject.ways if way.error <= limit or not way.added.any()]
+    """The ways that will do for bounced light too; the nearest one always does."""
+    # Light from all around, as surfaces that stand in every direction reflect it.
+    light = subject.albedo * np.sin(2 * np.radians(np.arange(DEGREES) + 0.5))
+    return [way for way in subject.ways if way.added @ light <= BOUNCE_TOLERANCE * light.sum()]
 
 
 def _greedy(

@@ -5,7 +5,7 @@ The nearest that a record has to its measurement is what the other ways are comp
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +25,13 @@ _ANGLES = np.arange(DEGREES) + 0.5
 class Way:
     """A way to show a material: a kind and, for a baked one, the record's entry it shows.
 
-    `cost` is in closures. `error` is the part of the light that is off over all view angles,
-    `by_angle` at most what is off at each degree from the normal, and `added` how far the way is
-    from the nearest one there.
+    `cost` is in closures. `by_angle` is at most the part of the light that is off at each degree
+    from the normal, and `added` how far the way is from the nearest one there.
     """
 
     kind: str
     closures: Mapping[str, Any] | None
     cost: float
-    error: float
     by_angle: NDArray[np.float64]
     added: NDArray[np.float64]
 
@@ -45,13 +43,13 @@ class Way:
 
 def ways_of(record: Any) -> tuple[Way, ...]:
     """All ways to show a record's measurement, as far as their error is known."""
-    known = [source for source in _sources(record) if np.isfinite(source[-1])]
+    known = [source for source in _sources(record) if np.isfinite(source.error)]
     nearest = min(_measured(record), key=lambda entry: entry["error"], default=None)
     if nearest is None:
-        least = min(source[-1] for source in known)
-        return tuple(_even_way(*source, least) for source in known)
+        least = min(source.error for source in known)
+        return tuple(_even_way(source, least) for source in known)
     comparison = Comparison(record, nearest)
-    return tuple(_compared_way(*source, comparison, nearest) for source in known)
+    return tuple(_compared_way(source, comparison, nearest) for source in known)
 
 
 def albedo_of(record: Any) -> NDArray[np.float64]:
@@ -71,22 +69,28 @@ def _measured(record: Any) -> list[Mapping[str, Any]]:
     return [entry for entry in record.closures if entry["target"] == "measured"]
 
 
-_Source = tuple[str, Mapping[str, Any] | None, float, float]
+class _Source(NamedTuple):
+    """What a record itself says of a way; `error` is that over all angles."""
+
+    kind: str
+    closures: Mapping[str, Any] | None
+    cost: float
+    error: float
 
 
 def _sources(record: Any) -> list[_Source]:
-    """Kind, entry, cost and error of every way; an error that is not known is infinite."""
+    """All ways of a record; an error that is not known is infinite."""
     fit_error = _known(record.error["relative_l1_cosine"]["pooled"])
     # The error of closures made for the fitted lobe comes on top of the fit's own.
     beneath = {"measured": 0.0, "lobe": fit_error}
     baked = [
-        (entry["target"], entry, _cost(entry), entry["error"] + beneath[entry["target"]])
+        _Source(entry["target"], entry, _cost(entry), entry["error"] + beneath[entry["target"]])
         for entry in record.closures
     ]
     return [
         *baked,
-        ("principled", None, PRINCIPLED_COST, _known(record.principled["error"])),
-        ("live", None, LIVE_COST, fit_error),
+        _Source("principled", None, PRINCIPLED_COST, _known(record.principled["error"])),
+        _Source("live", None, LIVE_COST, fit_error),
     ]
 
 
@@ -99,30 +103,23 @@ def _cost(entry: Mapping[str, Any]) -> float:
     return drawn + DIFFUSE_COST * (not is_black(entry["diffuse"]))
 
 
-def _compared_way(
-    kind: str,
-    entry: Mapping[str, Any] | None,
-    cost: float,
-    error: float,
-    comparison: Comparison,
-    nearest: Mapping[str, Any],
-) -> Way:
+def _compared_way(source: _Source, comparison: Comparison, nearest: Mapping[str, Any]) -> Way:
     """A way beside the nearest one, which is itself off from the measurement."""
+    kind, entry, cost, _ = source
     added = comparison.distances(kind, entry)
     if kind == "measured":
-        off = np.asarray(entry["by_view"]["relative_error"], float)
+        off = entry["by_view"]["relative_error"]
     else:
         off = added + nearest["by_view"]["relative_error"]
     angles = comparison.angles
-    return Way(kind, entry, cost, error, _at_angles(angles, off), _at_angles(angles, added))
+    return Way(kind, entry, cost, _at_angles(angles, off), _at_angles(angles, added))
 
 
-def _even_way(
-    kind: str, entry: Mapping[str, Any] | None, cost: float, error: float, least: float
-) -> Way:
+def _even_way(source: _Source, least: float) -> Way:
     """A way with nothing to compare it with: it is taken to be off by the same at every angle."""
+    kind, entry, cost, error = source
     even = np.ones(DEGREES)
-    return Way(kind, entry, cost, error, even * error, even * (error - least))
+    return Way(kind, entry, cost, even * error, even * (error - least))
 
 
 def _at_angles(angles: Sequence[float], values: Sequence[float]) -> NDArray[np.float64]:

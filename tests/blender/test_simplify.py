@@ -495,6 +495,26 @@ def test_closures_that_are_missing_are_found(addon, records, two_spheres):
     assert [material["lobefit_closures"] for material in two_spheres] == [2, 1]
 
 
+def test_missing_closures_keep_the_cap(two_spheres):
+    metal, _ = two_spheres
+    record = json.loads(metal["lobefit_record"])
+    record["closures"] = [record["closures"][3] | {"cap_albedo": True}]
+    metal["lobefit_record"] = json.dumps(record)
+    bpy.ops.lobefit.simplify_scene(tolerance=10)
+    closures = json.loads(metal["lobefit_record"])["closures"]
+    assert [entry["cap_albedo"] for entry in closures] == [True] * 4
+
+
+def test_of_entries_with_as_many_closures_the_shown_one_is_found(simplification, two_spheres):
+    metal, _ = two_spheres
+    record = json.loads(metal["lobefit_record"])
+    two, three = record["closures"][2:]
+    two["specular"] = [*two["specular"], three["specular"][0]]
+    metal["lobefit_record"] = json.dumps(record)
+    bpy.ops.lobefit.simplify_scene(tolerance=0)
+    assert simplification.result_of(bpy.context.scene)["materials"][0]["before"]["count"] == 3
+
+
 def test_without_closures_or_a_file(addon, two_spheres):
     for material in two_spheres:
         record = json.loads(material["lobefit_record"])
