@@ -47,7 +47,8 @@ UNSEEN = (0.0, -40.0, 0.0)
 PATH = (((-9.0, -9.0, 1.0), (-3.0, 4.0, 1.3)), ((8.0, -11.0, 2.2), (2.5, 4.0, 1.3)))
 SUNS = (((0.5, -0.8, 1.0), 3.0, 1.0), ((-0.8, -0.2, 0.5), 1.5, 4.0))  # toward, strength, degrees
 SKY = 0.4
-TIMED_SAMPLES = 16
+LOOKED_AT = 8  # frames
+TIMED_SAMPLES, FEW_SAMPLES = 64, 16
 
 
 def add(data: bpy.types.ID, place: Matrix) -> bpy.types.Object:
@@ -171,7 +172,7 @@ def pictures_of(
 
 
 def seconds_of(path: Path, frames: Sequence[int]) -> NDArray[np.float64]:
-    """Processor time of each frame, with few samples and no picture written."""
+    """Processor time of each frame, with no picture written."""
     with quiet():
         bpy.ops.wm.open_mainfile(filepath=str(path))
         scene = bpy.context.scene
@@ -206,7 +207,7 @@ def print_row(name: str, cells: Sequence[str]) -> None:
     print(f"| {name} | {' | '.join(cells)} |", flush=True)
 
 
-def print_head(title: str, frames: Sequence[int]) -> None:
+def print_head(title: str, frames: Sequence[int | str]) -> None:
     print(f"\n{title}\n")
     print_row("frame", list(map(str, frames)))
     print("|---" * (len(frames) + 1) + "|")
@@ -250,44 +251,58 @@ def main() -> None:
 
 
 def run(folder: Path, records: Sequence[Record], options: argparse.Namespace) -> None:
-    full, frames = folder / "full.blend", options.frames
+    full = folder / "full.blend"
     with quiet():
         save_shelf(full, records, options.width)
     files = {}
     for tolerance in options.tolerances:
-        path = files[f"{tolerance:g} %"] = folder / f"{tolerance:g}.blend"
-        result = blender.simplify(full, path, tolerance / 100, 8)
+        path = files[f"simplified, {tolerance:g} %"] = folder / f"{tolerance:g}.blend"
+        result = blender.simplify(full, path, tolerance / 100, LOOKED_AT)
         print("\n" + "\n".join(simplified.lines(result)), flush=True)
+    print_changes(full, files, options)
+    print_seconds({"as it was": full, **files}, options)
+    print_restored(full, files, options.frames)
 
+
+def print_changes(full: Path, files: dict[str, Path], options: argparse.Namespace) -> None:
+    frames, samples = options.frames, options.samples
     print_head("Part of the picture's light that changed, noise included", frames)
-    reference = pictures_of(full, frames, options.samples)
-    noise = changed(pictures_of(full, frames, options.samples, seed=1), reference)
+    reference = pictures_of(full, frames, samples)
+    noise = changed(pictures_of(full, frames, samples, seed=1), reference)
     print_row("another seed", [f"{part:.2%}" for part in noise])
     pictures = {}
     for name, path in files.items():
-        pictures[name] = pictures_of(path, frames, options.samples)
+        pictures[name] = pictures_of(path, frames, samples)
         parts = changed(pictures[name], reference)
-        print_row(f"simplified, {name}", [f"{part:.2%}" for part in parts])
+        print_row(name, [f"{part:.2%}" for part in parts])
     if options.pictures:
         write_pictures(options.pictures, frames, reference, pictures)
 
-    print_head(f"Processor seconds a frame, least of {options.rounds} rounds", frames)
-    rounds = [
-        [seconds_of(path, frames) for path in (full, *files.values())]
-        for _ in range(options.rounds)
-    ]
-    for name, least in zip(("as it was", *files), np.min(rounds, 0), strict=True):
-        print_row(name, [f"{seconds:.2f}" for seconds in least])
 
+def print_seconds(files: dict[str, Path], options: argparse.Namespace) -> None:
+    title = f"Processor seconds a frame, least of {options.rounds} rounds"
+    print_head(title, [*options.frames, "all"])
+    # A round goes through all files: a slow minute then slows all of them.
+    rounds = [
+        [seconds_of(path, options.frames) for path in files.values()] for _ in range(options.rounds)
+    ]
+    for name, least in zip(files, np.min(rounds, 0), strict=True):
+        print_row(name, [f"{seconds:.2f}" for seconds in (*least, least.sum())])
+
+
+def print_restored(full: Path, files: dict[str, Path], frames: Sequence[int]) -> None:
     print_head("Restored from the file: the largest difference of a pixel", frames)
-    materials = materials_in(full)
+    materials, before = materials_in(full), pictures_of(full, frames, FEW_SAMPLES)
+    told = []
     for name, path in files.items():
-        back = folder / "back.blend"
+        back = path.with_suffix(".restored.blend")
         blender.restore(path, back)
-        pairs = zip(pictures_of(back, frames, 16), pictures_of(full, frames, 16), strict=True)
-        print_row(name, [f"{np.abs(now - before).max():g}" for now, before in pairs])
-        same = materials_in(back) == materials
-        print(f"\n{name}: the materials are {'the same' if same else 'NOT the same'}\n")
+        pairs = zip(pictures_of(back, frames, FEW_SAMPLES), before, strict=True)
+        print_row(name, [f"{np.abs(now - then).max():g}" for now, then in pairs])
+        told.append(
+            f"{name}: materials {'' if materials_in(back) == materials else 'not '}as before"
+        )
+    print("\n" + "\n".join(told))
 
 
 if __name__ == "__main__":
