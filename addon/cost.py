@@ -72,11 +72,13 @@ def measure_costs(
     before = bpy.context.scene
     scene, item = _scene(lights)
     times: dict[Name, list[float]] = {name: [] for name in materials}
-    for _, (name, material) in itertools.product(range(rounds), materials.items()):
-        item.data.materials[0] = material
-        times[name].append(_seconds(scene, samples) / (_SIZE * _SIZE * samples))
-    bpy.context.window.scene = before
-    _remove(scene)
+    try:
+        for _, (name, material) in itertools.product(range(rounds), materials.items()):
+            item.data.materials[0] = material
+            times[name].append(_seconds(scene, samples) / (_SIZE * _SIZE * samples))
+    finally:
+        bpy.context.window.scene = before
+        _remove(scene)
     return {name: Cost(min(each), statistics.median(each)) for name, each in times.items()}
 
 

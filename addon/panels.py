@@ -16,8 +16,8 @@ from .operators.run import current
 from .operators.simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 from .properties import KINDS, MODELS, draw_fit_options, draw_simplify_options
 from .records import active_material, record_of
-from .scene_budget import is_simplified
 from .simplification import result_of
+from .swaps import is_simplified
 
 TITLE = "Measured BRDF"
 # Up to which part of the reflected light that is off, what to call a fit.

@@ -10,8 +10,8 @@ KEY = "lobefit_record"
 KIND_KEY, COUNT_KEY = "lobefit_kind", "lobefit_closures"
 # Whether light that bounced off a diffuse surface meets a diffuse closure only.
 BOUNCES_KEY = "lobefit_diffuse_bounces"
-# What a simplified material showed before, with the count by which its record names the closures.
-BEFORE_KIND_KEY, BEFORE_COUNT_KEY = "lobefit_kind_before", "lobefit_closures_before"
+# What a simplified material showed before, as the options of `fill_material`.
+BEFORE_KEY = "lobefit_before"
 
 
 def active_material(context: bpy.types.Context) -> bpy.types.Material | None:

@@ -29,7 +29,7 @@ def two_lights_scene(material: bpy.types.Material | None, size: int) -> bpy.type
     if scene.objects:
         scene = bpy.data.scenes.new("Two Lights")
         bpy.context.window.scene = scene
-    _add(scene, "Sphere", _sphere_mesh(material))
+    _add(scene, "Sphere", sphere_mesh(material))
     scene.camera = _add(scene, "Camera", _camera())
     scene.camera.location = (0, 0, 10)
     for name, direction in LIGHTS.items():
@@ -76,15 +76,37 @@ def render_pixels(scene: bpy.types.Scene) -> NDArray[np.float32]:
         return sum(_pixels_under(scene, sun, suns) for sun in suns)
 
 
-def _pixels_under(scene: bpy.types.Scene, sun: Any, suns: list[Any]) -> NDArray[np.float32]:
+def radiance(scene: bpy.types.Scene) -> NDArray[np.float32]:
+    """The current frame (rows, columns, 3) as it is rendered, in linear light, from the top."""
     settings = {"file_format": "OPEN_EXR", "color_mode": "RGB", "color_depth": "32"}
-    with contextlib.ExitStack() as restored, tempfile.TemporaryDirectory() as folder:
-        for other in suns:
-            restored.enter_context(_set(other, hide_render=other != sun))
-        restored.enter_context(_set(scene.render.image_settings, **settings))
+    with (
+        _set(scene.render.image_settings, **settings),
+        tempfile.TemporaryDirectory() as folder,
+    ):
         path = Path(folder) / "radiance.exr"
         _render_to(scene, path)
         return _read_pixels(path)
+
+
+def sphere_mesh(material: bpy.types.Material | None) -> bpy.types.Mesh:
+    """A smooth unit sphere of the material."""
+    mesh = bpy.data.meshes.new("Sphere")
+    shape = bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=6, radius=1.0)
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.shade_smooth()
+    # A sphere's own normals; those of the faces around a vertex only come close.
+    mesh.normals_split_custom_set_from_vertices([v.co.normalized() for v in mesh.vertices])
+    mesh.materials.append(material)
+    return mesh
+
+
+def _pixels_under(scene: bpy.types.Scene, sun: Any, suns: list[Any]) -> NDArray[np.float32]:
+    with contextlib.ExitStack() as restored:
+        for other in suns:
+            restored.enter_context(_set(other, hide_render=other != sun))
+        return radiance(scene)
 
 
 def _render_to(scene: bpy.types.Scene, path: str | os.PathLike[str]) -> None:
@@ -109,19 +131,6 @@ def _add(scene: bpy.types.Scene, name: str, data: bpy.types.ID) -> bpy.types.Obj
     item = bpy.data.objects.new(name, data)
     scene.collection.objects.link(item)
     return item
-
-
-def _sphere_mesh(material: bpy.types.Material | None) -> bpy.types.Mesh:
-    mesh = bpy.data.meshes.new("Sphere")
-    shape = bmesh.new()
-    bmesh.ops.create_icosphere(shape, subdivisions=6, radius=1.0)
-    shape.to_mesh(mesh)
-    shape.free()
-    mesh.shade_smooth()
-    # A sphere's own normals; those of the faces around a vertex only come close.
-    mesh.normals_split_custom_set_from_vertices([v.co.normalized() for v in mesh.vertices])
-    mesh.materials.append(material)
-    return mesh
 
 
 def _camera() -> bpy.types.Camera:

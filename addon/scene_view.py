@@ -47,11 +47,6 @@ class View:
         bins += np.bincount(np.minimum(angles, DEGREES - 1), minlength=DEGREES)
 
 
-def sampled_frames(scene: bpy.types.Scene, count: int) -> list[int]:
-    """At most `count` frames of the scene's range, evenly spread, with the first and the last."""
-    return evenly(scene.frame_start, scene.frame_end, count)
-
-
 def evenly(first: int, last: int, count: int) -> list[int]:
     """At most `count` whole numbers from first to last, with both unless there is room for one."""
     return sorted({round(place) for place in np.linspace(first, last, max(1, count))})
@@ -142,14 +137,14 @@ class _Look:
     """The rays of one frame, and the meshes they meet."""
 
     def __init__(self, context: bpy.types.Context, rays: int) -> None:
-        self._scene = context.scene
+        self._scene, self._layer = context.scene, context.view_layer
         self._rays = rays
         self._depsgraph = context.evaluated_depsgraph_get()
         self._meshes: dict[_Key, list[bpy.types.Mesh]] = {}
         self._present: set[int] = set()
         self._passed: dict[str, bool] = {}
-        rendered = _rendered_objects(context.view_layer)
-        self._unrendered = {item.name_full for item in context.view_layer.objects}
+        rendered = _rendered_objects(self._layer)
+        self._unrendered = {item.name_full for item in self._layer.objects}
         self._unrendered -= {item.name_full for item in rendered}
         for instance in self._depsgraph.object_instances:
             self._note(instance.object, instance.matrix_world)
@@ -224,8 +219,12 @@ class _Look:
         """Whether camera rays of a render go through the object as if it were not there."""
         name = item.name_full
         if name not in self._passed:
-            hidden = item.hide_render or not item.visible_camera or name in self._unrendered
-            self._passed[name] = hidden
+            self._passed[name] = (
+                item.hide_render
+                or not item.visible_camera
+                or name in self._unrendered
+                or item.original.indirect_only_get(view_layer=self._layer)
+            )
         return self._passed[name]
 
     def _count(self, view: View, item: bpy.types.Object, key: "_Key", hits: "list[_Hit]") -> None:

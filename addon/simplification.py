@@ -13,25 +13,21 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .nodes.material import BAKED
-from .records import BOUNCES_KEY, KEY
+from .records import KEY
 from .scene import render_seconds
-from .scene_budget import (
-    BOUNCE_TOLERANCE,
-    Choice,
-    Subject,
-    Way,
-    choose_ways,
+from .scene_budget import BOUNCE_TOLERANCE, Decision, Subject, choose_ways
+from .scene_view import lights, shown_only_in_renders
+from .survey import Survey
+from .swaps import (
+    has_bounces,
     is_as_built,
+    is_named,
     is_simplified,
     problem_of,
     restore,
     show,
-    subject_of,
-    ways_of,
 )
-from .scene_view import lights, shown_only_in_renders
-from .survey import Survey
+from .ways import Way, albedo_of, ways_of
 
 RESULT_KEY = "lobefit_simplified"
 
@@ -52,12 +48,9 @@ def simplify(
     scene = context.scene
     timed = timed and scene.render.engine == "CYCLES"
     subjects, skipped = _subjects(context, survey)
-    choices = choose_ways(subjects, survey.views, tolerance) if subjects else []
+    decisions = choose_ways(subjects, survey.views, tolerance)
     before = render_seconds(scene) if timed else None
-    materials = {material.session_uid: material for material in bpy.data.materials}
-    changed = [
-        _change(materials[choice.subject.uid], choice, diffuse_bounces) for choice in choices
-    ]
+    rows = [_row(decision) | _change(decision, diffuse_bounces) for decision in decisions]
     after = render_seconds(scene) if timed else None
     result = {
         "scene": scene.name,
@@ -67,36 +60,38 @@ def simplify(
         "rays": max(view.rays for view in survey.views),
         "seconds": {"before": before, "after": after},
         **lights(context),
-        **_sums(choices),
-        "materials": [
-            _row(choice, new) | {"diffuse_bounces": _has_bounces(materials[choice.subject.uid])}
-            for choice, new in zip(choices, changed, strict=True)
-        ],
-        "skipped": [{"material": name, "reason": reason} for name, reason in skipped],
+        **_sums(decisions),
+        "materials": rows,
+        "skipped": skipped,
     }
-    if choices:
+    if rows:
         scene[RESULT_KEY] = json.dumps(result)
     return result
 
 
-def restore_all(context: bpy.types.Context) -> dict[str, Any]:
+def restore_all() -> dict[str, Any]:
     """Puts back what every simplified material of the file showed before."""
-    import lobefit
-
     restored, skipped = [], []
     for material in filter(is_simplified, bpy.data.materials):
-        reason = problem_of(material)
-        if not reason:
-            try:
-                restore(material, lobefit.Record.from_json(material[KEY], material.name))
-                restored.append(material.name)
-                continue
-            except (ValueError, TypeError):
-                reason = "its record does not hold what it showed"
-        skipped.append({"material": material.name, "reason": reason})
-    if RESULT_KEY in context.scene:
-        del context.scene[RESULT_KEY]
+        reason = problem_of(material) or _restored(material)
+        if reason:
+            skipped.append(_skipped(material, reason))
+        else:
+            restored.append(material.name)
+    for scene in bpy.data.scenes:
+        scene.pop(RESULT_KEY, None)
     return {"restored": restored, "skipped": skipped}
+
+
+def _restored(material: bpy.types.Material) -> str:
+    """Puts back what the material showed; returns the reason where that is not possible."""
+    import lobefit
+
+    try:
+        restore(material, lobefit.Record.from_json(material[KEY], material.name))
+    except (ValueError, TypeError):
+        return "its record does not hold what it showed"
+    return ""
 
 
 def result_of(scene: bpy.types.Scene) -> dict[str, Any] | None:
@@ -109,67 +104,79 @@ def result_of(scene: bpy.types.Scene) -> dict[str, Any] | None:
 
 def _subjects(
     context: bpy.types.Context, survey: Survey
-) -> tuple[list[Subject], list[tuple[str, str]]]:
+) -> tuple[list[Subject], list[dict[str, str]]]:
     """The materials to choose for, and the others of the scene with the reason why not."""
-    present, hidden = survey.present(), shown_only_in_renders(context)
+    hidden = shown_only_in_renders(context)
+    wanted = survey.present() | set(hidden)
+    ways: dict[int, tuple[Way, ...]] = {}
     subjects, skipped = [], []
-    # Many materials may have one record.
-    ways: dict[str, tuple[Way, ...]] = {}
     for material in list(bpy.data.materials):
         uid = material.session_uid
-        if KEY not in material or uid not in present | set(hidden):
+        if KEY not in material or uid not in wanted:
             continue
-        reason = survey.skipped.get(uid, "")
         if uid in hidden:
-            reason = f"the viewport hides {hidden[uid]}, which renders show"
-        elif not reason:
-            record = survey.records.get(uid)
-            found = "it is new"
-            if record is not None:
-                text = record.to_json()
-                ways[text] = ways.get(text) or ways_of(record)
-                found = subject_of(material, record, ways[text])
-            if isinstance(found, str):
-                reason = found
-            elif not is_as_built(material, record, found.now, _has_bounces(material)):
-                reason = "its nodes were changed by hand"
-            else:
-                subjects.append(found)
-        if reason:
-            skipped.append((material.name, reason))
+            found = f"the viewport hides {hidden[uid]}, which renders show"
+        elif uid in survey.records:
+            found = _subject(material, survey.records[uid], ways)
+        else:
+            found = survey.skipped.get(uid, "it is new")
+        if isinstance(found, Subject):
+            subjects.append(found)
+        else:
+            skipped.append(_skipped(material, found))
     return subjects, skipped
 
 
-def _has_bounces(material: bpy.types.Material) -> bool:
-    return bool(material.get(BOUNCES_KEY, False))
+def _subject(
+    material: bpy.types.Material, record: Any, ways: dict[int, tuple[Way, ...]]
+) -> Subject | str:
+    """The material with the ways of its record, or why it has to be left as it is.
+
+    `ways` keeps those of a record for the next material that has it.
+    """
+    if id(record) not in ways:
+        ways[id(record)] = ways_of(record)
+    known = ways[id(record)]
+    named = [way for way in known if is_named(material, way)]
+    if not named:
+        return "what it shows is not in its record"
+    # Of two entries with as many closures only one is what is shown.
+    now = next((way for way in named if is_as_built(material, record, way)), None)
+    if now is None:
+        return "its nodes were changed by hand"
+    return Subject(material, record, now, known, albedo_of(record))
 
 
-def _change(material: bpy.types.Material, choice: Choice, diffuse_bounces: bool) -> bool:
-    """Shows the material as chosen; says whether that is another way than before."""
-    way, now, record = choice.way, choice.subject.now, choice.subject.record
+def _skipped(material: bpy.types.Material, reason: str) -> dict[str, str]:
+    return {"material": material.name, "reason": reason}
+
+
+def _change(decision: Decision, diffuse_bounces: bool) -> dict[str, bool]:
+    """Shows the material as chosen; tells whether that is another way than before."""
+    way, subject = decision.way, decision.subject
     bounces = diffuse_bounces and way.kind != "principled"
-    same = (way.kind, way.count) == (now.kind, now.count) and bounces == _has_bounces(material)
-    if same:
-        # Closures that were found on the way are kept for the next time.
-        material[KEY] = record.to_json()
+    changed = way is not subject.now or bounces != has_bounces(subject.material)
+    if changed:
+        show(subject.material, subject.record, subject.now, way, bounces)
     else:
-        show(material, record, now, way, bounces)
-    return not same
+        # Closures that were found on the way are kept for the next time.
+        subject.material[KEY] = subject.record.to_json()
+    return {"changed": changed, "diffuse_bounces": bounces}
 
 
-def _sums(choices: list[Choice]) -> dict[str, Any]:
+def _sums(decisions: list[Decision]) -> dict[str, Any]:
     """Errors of the worst frame, and the closures drawn in a pixel of the picture on average."""
 
     def worst(errors: list[NDArray[np.float64]]) -> float:
         return float(np.sum(errors, axis=0).max()) if errors else 0.0
 
-    shares = [float(choice.share.mean()) for choice in choices]
-    before = [choice.subject.now.cost for choice in choices]
-    after = [choice.way.cost for choice in choices]
+    shares = [float(decision.share.mean()) for decision in decisions]
+    before = [decision.subject.now.cost for decision in decisions]
+    after = [decision.way.cost for decision in decisions]
     return {
-        "error_added": worst([choice.added for choice in choices]),
-        "error": worst([choice.error for choice in choices]),
-        "error_before": worst([choice.error_before for choice in choices]),
+        "error_added": worst([decision.added for decision in decisions]),
+        "error": worst([decision.error for decision in decisions]),
+        "error_before": worst([decision.error_before for decision in decisions]),
         "closures": {
             "before": float(np.dot(shares, before)),
             "after": float(np.dot(shares, after)),
@@ -177,19 +184,18 @@ def _sums(choices: list[Choice]) -> dict[str, Any]:
     }
 
 
-def _row(choice: Choice, changed: bool) -> dict[str, Any]:
-    now, way = choice.subject.now, choice.way
+def _row(decision: Decision) -> dict[str, Any]:
+    now, way = decision.subject.now, decision.way
     return {
-        "material": choice.subject.name,
+        "material": decision.subject.material.name,
         "before": _told(now),
         "after": _told(way),
-        "changed": changed,
-        "share": float(choice.share.mean()),
-        "angles": _angles(choice),
-        "error_added": float(choice.added.max()),
-        "error": float(choice.error.max()),
-        "error_before": float(choice.error_before.max()),
-        "left_out": left_out(choice.subject, way),
+        "share": float(decision.share.mean()),
+        "angles": _angles(decision),
+        "error_added": float(decision.added.max()),
+        "error": float(decision.error.max()),
+        "error_before": float(decision.error_before.max()),
+        "left_out": left_out(decision.subject, way),
         "closures_saved": now.cost - way.cost,
     }
 
@@ -198,27 +204,26 @@ def _told(way: Way) -> dict[str, Any]:
     return {"kind": way.kind, "count": way.count, "cost": way.cost}
 
 
-def _angles(choice: Choice) -> list[float] | None:
+def _angles(decision: Decision) -> list[float] | None:
     """Between which view angles nine tenths of the rays are that meet the material."""
-    total = choice.seen.sum()
+    total = decision.seen.sum()
     if total == 0:
         return None
-    share = np.cumsum(choice.seen) / total
+    share = np.cumsum(decision.seen) / total
     return [float(np.searchsorted(share, part)) for part in (0.05, 0.95)]
 
 
 def left_out(subject: Subject, way: Way) -> str:
     """What the material does without, compared with what it showed."""
     now = subject.now
-    if (way.kind, way.count) == (now.kind, now.count):
+    if way is now:
         return "nothing"
     if way.kind == "principled":
         return "all but a Principled BSDF"
-    if now.kind in BAKED:
-        lobes = now.count - way.count
-        return f"{lobes} of {now.count} lobes" if lobes > 0 else "nothing"
-    if now.kind == "live" and way.kind in BAKED:
+    if now.kind == "live":
         most = max(other.count for other in subject.ways if other.kind == way.kind)
         dropped = f", {most - way.count} of {most} lobes" if way.count < most else ""
         return f"live sockets{dropped}"
-    return "nothing"
+    if way.closures is None or way.count >= now.count:
+        return "nothing"
+    return f"{now.count - way.count} of {now.count} lobes"

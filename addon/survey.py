@@ -6,62 +6,64 @@ from typing import Any
 import bpy
 
 from .records import KEY
-from .scene_budget import problem_of
-from .scene_view import View, look, problem_of_camera, sampled_frames
-
-MOST_CLOSURES = 3
+from .scene_view import View, evenly, look, problem_of_camera
+from .swaps import problem_of
 
 
 class Survey:
     """Looks at the current scene frame by frame, then finds closures that records lack.
 
     `views` are the frames looked at, `records` those of the materials that may be changed, by
-    `session_uid`, and `skipped` says of other measured materials why not. `problem` is a sentence
-    when the survey could not be made. It has what `operators.run` asks of work under way.
+    `session_uid`, and `skipped` says of other measured materials why not. Materials that carry the
+    same text share a record. `problem` is a sentence when the survey could not be made. It has what
+    `operators.run` asks of work under way.
     """
 
     def __init__(self, context: bpy.types.Context, frames: int) -> None:
-        self.frames = sampled_frames(context.scene, frames)
+        scene = context.scene
+        self.frames = evenly(scene.frame_start, scene.frame_end, frames)
         self.views: list[View] = []
         self.records: dict[int, Any] = {}
         self.skipped: dict[int, str] = {}
-        self.problem = problem_of_camera(context.scene)
-        self._scene_uid = context.scene.session_uid
-        self._missing: list[int] | None = None
+        self.problem = problem_of_camera(scene)
+        self._scene_uid = scene.session_uid
+        # Records that lack closures; not known before all frames were looked at.
+        self._lacking: list[Any] | None = None
+        self._lacked = 0
         self._job: Any = None
-        for material in bpy.data.materials:
-            if KEY in material:
-                self._read(material)
+        self._read()
 
     @property
     def done(self) -> bool:
         """Whether nothing is left to find out, or nothing can be."""
-        return bool(self.problem) or self._missing == []
+        return bool(self.problem) or self._lacking == []
 
     @property
     def progress(self) -> float:
         """The share that is done, from 0 to 1; frames are one half of the work."""
         if self.done:
             return 1.0
-        if self._missing is None:
+        if self._lacking is None:
             return 0.5 * len(self.views) / len(self.frames)
         found = self._job.progress if self._job else 0.0
-        return 0.5 + 0.5 * (found + self._had - len(self._missing)) / self._had
+        return 0.5 + 0.5 * (found + self._lacked - len(self._lacking)) / self._lacked
 
     @property
     def text(self) -> str:
         """What is being done."""
         if self.done:
             return "Done"
-        if self._missing is None:
+        if self._lacking is None:
             return f"Frame {self.frames[len(self.views)]}"
-        return f"Closures of {self.records[self._missing[0]].name}"
+        return f"Closures of {self._lacking[0].name}"
 
     def advance(self, seconds: float) -> bool:
         """Looks at one frame, or waits at most `seconds` for closures; says whether all is done."""
+        if bpy.context.scene.session_uid != self._scene_uid:
+            self.problem = "Another scene was chosen while this one was being looked at."
         if self.done:
             return True
-        if self._missing is None:
+        if self._lacking is None:
             self._look()
         else:
             self._find_closures(seconds)
@@ -77,23 +79,25 @@ class Survey:
         """The materials of all objects in the frames looked at."""
         return set().union(*(view.present for view in self.views))
 
-    def _read(self, material: bpy.types.Material) -> None:
+    def _read(self) -> None:
         import lobefit
 
-        uid = material.session_uid
-        reason = problem_of(material)
-        if not reason:
+        known: dict[str, Any] = {}
+        for material in bpy.data.materials:
+            if KEY not in material:
+                continue
+            uid, text, reason = material.session_uid, material[KEY], problem_of(material)
             try:
-                self.records[uid] = lobefit.Record.from_json(material[KEY], material.name)
-                return
+                if not reason and text not in known:
+                    known[text] = lobefit.Record.from_json(text, material.name)
             except (lobefit.InputError, TypeError):
                 reason = "its record cannot be read"
-        self.skipped[uid] = reason
+            if reason:
+                self.skipped[uid] = reason
+            else:
+                self.records[uid] = known[text]
 
     def _look(self) -> None:
-        if bpy.context.scene.session_uid != self._scene_uid:
-            self.problem = "Another scene was chosen while this one was being looked at."
-            return
         try:
             self.views.append(look(bpy.context, self.frames[len(self.views)]))
         except ValueError as problem:
@@ -101,30 +105,42 @@ class Survey:
             return
         if len(self.views) == len(self.frames):
             present = self.present()
-            self._missing = [uid for uid in self.records if uid in present and self._lacks(uid)]
-            self._had = len(self._missing)
-
-    def _lacks(self, uid: int) -> list[int]:
-        """Which numbers of closures the record has no entry for, if its measurement is there."""
-        record = self.records[uid]
-        known = {entry["count"] for entry in record.closures if entry["target"] == "measured"}
-        lacking = [count for count in range(MOST_CLOSURES + 1) if count not in known]
-        path = record.source["path"]
-        return lacking if path and Path(path).is_file() else []
+            records = {id(record): record for uid, record in self.records.items() if uid in present}
+            self._lacking = [record for record in records.values() if _lacks(record)]
+            self._lacked = len(self._lacking)
 
     def _find_closures(self, seconds: float) -> None:
         import lobefit
 
-        uid = self._missing[0]
+        before = after = self._lacking[0]
         try:
             if self._job is None:
-                wanted = [lobefit.Closures("measured", count) for count in self._lacks(uid)]
-                self._job = lobefit.start_fit(self.records[uid], closures=wanted)
+                self._job = lobefit.start_fit(before, closures=_lacks(before))
             if not self._job.wait(seconds):
                 return
-            self.records[uid] = self._job.record()
+            after = self._job.record()
         except (lobefit.InputError, MemoryError):
             # The choice is then among what the record holds.
             pass
         self._job = None
-        self._missing.pop(0)
+        self._lacking.pop(0)
+        for uid, record in self.records.items():
+            if record is before:
+                self.records[uid] = after
+
+
+def _lacks(record: Any) -> list[Any]:
+    """The closures that the record has no entry for, if its measurement is there."""
+    from lobefit.fitting import MOST_CLOSURES, Closures
+
+    path = record.source["path"]
+    if not path or not Path(path).is_file():
+        return []
+    measured = [entry for entry in record.closures if entry["target"] == "measured"]
+    known = {entry["count"] for entry in measured}
+    capped = any(entry["cap_albedo"] for entry in measured)
+    return [
+        Closures("measured", count, cap_albedo=capped)
+        for count in range(MOST_CLOSURES + 1)
+        if count not in known
+    ]

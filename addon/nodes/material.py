@@ -6,14 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..records import (
-    BEFORE_COUNT_KEY,
-    BEFORE_KIND_KEY,
-    BOUNCES_KEY,
-    COUNT_KEY,
-    KEY,
-    KIND_KEY,
-)
+from ..records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KEY, KIND_KEY
 from .baked import baked_group
 from .live import live_group, live_inputs
 from .principled import principled_node
@@ -24,6 +17,8 @@ KINDS = ("live", "lobe", "measured", "principled", "auto")
 BAKED = ("lobe", "measured")
 # Up to which part of the light that is off `auto` takes a kind, if nothing else is asked for.
 TOLERANCE = 0.05
+# What a Principled BSDF costs, in specular closures (README, "Error against run time").
+PRINCIPLED_COST = 2.5
 
 
 def build_material(
@@ -132,12 +127,11 @@ def shown_by(material: bpy.types.Material, record: Any) -> Choice:
 def choices(record: Any, tolerance: float) -> list[Choice]:
     """The ways to show the measurement, the cheapest that is within the tolerance first.
 
-    Where none is within the tolerance, the nearest is first. Cost goes by the number of closures; a
-    Principled BSDF costs about as much as two (README, "Error against run time").
+    Where none is within the tolerance, the nearest is first. Cost goes by the number of closures.
     """
     measured = [entry for entry in record.closures if entry["target"] == "measured"]
     ways = [(entry["error"], entry["count"], Choice("measured", entry)) for entry in measured]
-    ways.append((record.principled["error"], 2.5, Choice("principled")))
+    ways.append((record.principled["error"], PRINCIPLED_COST, Choice("principled")))
     ways.sort(key=lambda way: (max(way[0], tolerance), way[1], way[0]))
     return [way for _, _, way in ways]
 
@@ -158,10 +152,8 @@ def _fill(material: bpy.types.Material, record: Any, choice: Choice, diffuse_bou
     material[KEY] = record.to_json()
     material[KIND_KEY], material[COUNT_KEY] = choice.kind, choice.count
     material[BOUNCES_KEY] = diffuse_bounces and shader is not None
-    for key in (BEFORE_KIND_KEY, BEFORE_COUNT_KEY):
-        # A material that is filled anew has nothing to go back to.
-        if key in material:
-            del material[key]
+    # A material that is filled anew has nothing to go back to.
+    material.pop(BEFORE_KEY, None)
 
 
 def _add_bounces(

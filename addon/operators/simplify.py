@@ -6,9 +6,9 @@ import bpy
 
 from .. import native
 from ..properties import SimplifyOptions
-from ..scene_budget import is_simplified
 from ..simplification import restore_all, simplify
 from ..survey import Survey
+from ..swaps import is_simplified
 from .run import RunsWork, current
 
 
@@ -70,7 +70,7 @@ class LOBEFIT_OT_restore_scene(bpy.types.Operator):
         if problem:
             self.report({"ERROR"}, problem)
             return {"CANCELLED"}
-        result = restore_all(context)
+        result = restore_all()
         for item in result["skipped"]:
             self.report({"WARNING"}, f"{item['material']}: left as it is, {item['reason']}")
         self.report({"INFO"}, f"{len(result['restored'])} materials restored")

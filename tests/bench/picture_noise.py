@@ -8,7 +8,6 @@ denoised picture of 64 samples against one of 4096, as a part of the mean.
 """
 
 import argparse
-import tempfile
 from pathlib import Path
 
 import bpy
@@ -19,7 +18,7 @@ from lobefit.inputs import record_of
 from lobefit.record import VISUAL_NORM
 from lobefit_addon import build_material
 from lobefit_addon.nodes.tree import empty_shader_tree
-from lobefit_addon.scene import two_lights_scene
+from lobefit_addon.scene import radiance, two_lights_scene
 from mathutils import Vector
 from numpy.typing import NDArray
 
@@ -56,9 +55,9 @@ def sky() -> bpy.types.World:
         return node.outputs["Value"]
 
     total = math("MULTIPLY_ADD", cosine_to(Vector((0, 1, 0))), 0.3, 0.5)
-    for toward, edge, radiance in LAMPS:
+    for toward, edge, strength in LAMPS:
         inside = math("GREATER_THAN", cosine_to(Vector(toward)), edge)
-        total = math("MULTIPLY_ADD", inside, radiance, total)
+        total = math("MULTIPLY_ADD", inside, strength, total)
     background = nodes.new("ShaderNodeBackground")
     links.new(total, background.inputs["Strength"])
     output = nodes.new("ShaderNodeOutputWorld")
@@ -78,8 +77,6 @@ def set_up_scene() -> bpy.types.Scene:
     # Black around the sphere: the sky itself has no noise to compare.
     scene.render.film_transparent = True
     scene.cycles.denoiser = "OPENIMAGEDENOISE"
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
     return scene
 
 
@@ -88,14 +85,7 @@ def picture(
 ) -> NDArray[np.float32]:
     scene.cycles.samples, scene.cycles.seed = samples, seed
     scene.cycles.use_denoising = denoise
-    with tempfile.TemporaryDirectory() as folder:
-        scene.render.filepath = str(Path(folder) / "picture.exr")
-        bpy.ops.render.render(write_still=True)
-        image = bpy.data.images.load(scene.render.filepath)
-        image.colorspace_settings.is_data = True
-        pixels = np.array(image.pixels, np.float32).reshape(SIZE, SIZE, -1)[..., :3]
-        bpy.data.images.remove(image)
-    return pixels
+    return radiance(scene)
 
 
 def noise_of(scene: bpy.types.Scene) -> tuple[float, float]:

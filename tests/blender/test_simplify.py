@@ -43,9 +43,15 @@ def view(addon):
 
 
 @pytest.fixture
-def budget(addon):
-    """The module that chooses kinds."""
-    return importlib.import_module(f"{addon.__name__}.scene_budget")
+def ways(addon):
+    """The module that lists the ways to show a record."""
+    return importlib.import_module(f"{addon.__name__}.ways")
+
+
+@pytest.fixture
+def swaps(addon):
+    """The module that changes materials and puts them back."""
+    return importlib.import_module(f"{addon.__name__}.swaps")
 
 
 @pytest.fixture
@@ -160,6 +166,13 @@ def test_objects_that_renders_do_not_show_are_passed(view):
     assert rays_of(view, back, rays=16)[1] == 1
     item.visible_camera, item.hide_render = True, True
     assert rays_of(view, back, rays=16)[1] == 1
+    item.hide_render = False
+    inner = bpy.data.collections.new("inner")
+    bpy.context.scene.collection.children.link(inner)
+    bpy.context.scene.collection.objects.unlink(item)
+    inner.objects.link(item)
+    bpy.context.view_layer.layer_collection.children["inner"].indirect_only = True
+    assert rays_of(view, back, rays=16)[1] == 1
 
 
 def test_instances_modifiers_and_slots(view):
@@ -184,6 +197,20 @@ def test_instances_modifiers_and_slots(view):
     assert right.session_uid not in seen.angles
 
 
+def test_a_camera_of_a_marker(view):
+    material = plain()
+    rectangle(material, -2, 2, -2, 2)
+    away = camera(location=(0, 0, 10))
+    away.rotation_euler.x = np.pi
+    scene = bpy.context.scene
+    scene.timeline_markers.new("away", frame=0).camera = away
+    scene.timeline_markers.new("near", frame=5).camera = camera(location=(0, 0, 10))
+    scene.frame_set(1)
+    shares = [view.look(bpy.context, frame).angles.get(material.session_uid) for frame in (1, 6)]
+    assert shares[0] is None and shares[1].sum() > 0
+    assert scene.camera == away and scene.frame_current == 1
+
+
 def test_frames_are_spread_evenly(view):
     assert view.evenly(1, 250, 3) == [1, 126, 250]
     assert view.evenly(5, 5, 8) == [5]
@@ -199,8 +226,8 @@ def test_lights_are_listed(view):
     assert view.lights(bpy.context)["world"]
 
 
-def test_the_error_of_the_principled_at_angles(budget, nickel):
-    (way,) = [way for way in budget.ways_of(nickel) if way.kind == "principled"]
+def test_the_error_of_the_principled_at_angles(ways, nickel):
+    (way,) = [way for way in ways.ways_of(nickel) if way.kind == "principled"]
     measured = lobefit.read(nickel.source["path"])
     theta, phi = np.meshgrid(
         (np.arange(600) + 0.5) / 600 * np.pi / 2, (np.arange(60) + 0.5) / 60 * np.pi, indexing="ij"
@@ -300,19 +327,6 @@ def test_the_picture_loses_no_more_than_was_asked(
     assert drawn[0] > drawn[1]
 
 
-def contents(budget, material):
-    """The material's nodes, and those of its groups, to be compared."""
-    tree = material.node_tree
-    groups = [node.node_tree for node in tree.nodes if node.type == "GROUP"]
-    curves = [
-        [tuple(point.location) for curve in node.mapping.curves for point in curve.points]
-        for group in groups
-        for node in group.nodes
-        if node.type in {"CURVE_FLOAT", "CURVE_RGB"}
-    ]
-    return [budget.tree_content(item) for item in (tree, *groups)], curves
-
-
 @pytest.fixture
 def two_spheres(addon, records):
     """Spheres side by side, a measured one and a live one, before a camera."""
@@ -326,11 +340,11 @@ def two_spheres(addon, records):
     return materials
 
 
-def test_restore_after_saving(addon, budget, two_spheres, tmp_path):
-    before = [contents(budget, material) for material in two_spheres]
+def test_restore_after_saving(swaps, two_spheres, tmp_path):
+    before = [swaps.tree_content(material.node_tree) for material in two_spheres]
     assert bpy.ops.lobefit.simplify_scene(tolerance=10) == {"FINISHED"}
     assert [material["lobefit_closures"] for material in two_spheres] == [1, 1]
-    assert [contents(budget, material) for material in two_spheres] != before
+    assert [swaps.tree_content(material.node_tree) for material in two_spheres] != before
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
     # Simplified again, a material still remembers what it was at first.
@@ -338,7 +352,7 @@ def test_restore_after_saving(addon, budget, two_spheres, tmp_path):
     assert bpy.ops.lobefit.simplify_scene(tolerance=10) == {"FINISHED"}
     assert bpy.ops.lobefit.restore_scene() == {"FINISHED"}
     materials = [bpy.data.materials[name] for name in ("metal", "rubber")]
-    assert [contents(budget, material) for material in materials] == before
+    assert [swaps.tree_content(material.node_tree) for material in materials] == before
     assert materials[1]["lobefit_kind"] == "live"
     assert not bpy.ops.lobefit.restore_scene.poll()
     assert "lobefit_simplified" not in bpy.context.scene
@@ -382,8 +396,8 @@ def test_rendering_is_timed(simplification, two_spheres):
     assert scene.render.resolution_percentage == 100
 
 
-def test_bounces_on_diffuse_surfaces(budget, two_spheres):
-    before = [contents(budget, material) for material in two_spheres]
+def test_bounces_on_diffuse_surfaces(swaps, two_spheres):
+    before = [swaps.tree_content(material.node_tree) for material in two_spheres]
     bpy.ops.lobefit.simplify_scene(tolerance=10, diffuse_bounces=True)
     for material in two_spheres:
         nodes = material.node_tree.nodes
@@ -396,7 +410,17 @@ def test_bounces_on_diffuse_surfaces(budget, two_spheres):
     bpy.ops.lobefit.simplify_scene(tolerance=10)
     assert not any(n.type == "MIX_SHADER" for m in two_spheres for n in m.node_tree.nodes)
     bpy.ops.lobefit.restore_scene()
-    assert [contents(budget, material) for material in two_spheres] == before
+    assert [swaps.tree_content(material.node_tree) for material in two_spheres] == before
+
+
+def test_bounces_of_a_material_are_put_back(addon, swaps, records, two_spheres):
+    metal, _ = two_spheres
+    addon.nodes.material.fill_material(metal, records["nickel"], "measured", diffuse_bounces=True)
+    before = swaps.tree_content(metal.node_tree)
+    bpy.ops.lobefit.simplify_scene(tolerance=0)
+    assert swaps.tree_content(metal.node_tree) != before
+    bpy.ops.lobefit.restore_scene()
+    assert swaps.tree_content(metal.node_tree) == before
 
 
 def skipped(simplification):
@@ -405,12 +429,23 @@ def skipped(simplification):
     return {item["material"]: item["reason"] for item in found}
 
 
-def test_what_a_user_changed_is_left(budget, simplification, two_spheres):
+def test_what_a_user_changed_is_left(swaps, simplification, two_spheres):
     metal, _ = two_spheres
     metal.node_tree.nodes["metal measured"].inputs["Strength"].default_value = 0.5
-    before = contents(budget, metal)
+    before = swaps.tree_content(metal.node_tree)
     bpy.ops.lobefit.simplify_scene(tolerance=10)
-    assert contents(budget, metal) == before
+    assert swaps.tree_content(metal.node_tree) == before
+    assert skipped(simplification) == {"metal": "its nodes were changed by hand"}
+
+
+def test_what_a_user_changed_in_a_group_is_left(swaps, simplification, two_spheres):
+    metal, _ = two_spheres
+    group = metal.node_tree.nodes["metal measured"].node_tree
+    curves = next(node for node in group.nodes if node.type == "CURVE_RGB").mapping.curves
+    curves[0].points[0].location.y *= 0.5
+    before = swaps.tree_content(metal.node_tree)
+    bpy.ops.lobefit.simplify_scene(tolerance=10)
+    assert swaps.tree_content(metal.node_tree) == before
     assert skipped(simplification) == {"metal": "its nodes were changed by hand"}
 
 
@@ -458,6 +493,26 @@ def test_closures_that_are_missing_are_found(addon, records, two_spheres):
     ]
     assert counts == [[2, 3], [0, 1, 2, 3]]
     assert [material["lobefit_closures"] for material in two_spheres] == [2, 1]
+
+
+def test_missing_closures_keep_the_cap(two_spheres):
+    metal, _ = two_spheres
+    record = json.loads(metal["lobefit_record"])
+    record["closures"] = [record["closures"][3] | {"cap_albedo": True}]
+    metal["lobefit_record"] = json.dumps(record)
+    bpy.ops.lobefit.simplify_scene(tolerance=10)
+    closures = json.loads(metal["lobefit_record"])["closures"]
+    assert [entry["cap_albedo"] for entry in closures] == [True] * 4
+
+
+def test_of_entries_with_as_many_closures_the_shown_one_is_found(simplification, two_spheres):
+    metal, _ = two_spheres
+    record = json.loads(metal["lobefit_record"])
+    two, three = record["closures"][2:]
+    two["specular"] = [*two["specular"], three["specular"][0]]
+    metal["lobefit_record"] = json.dumps(record)
+    bpy.ops.lobefit.simplify_scene(tolerance=0)
+    assert simplification.result_of(bpy.context.scene)["materials"][0]["before"]["count"] == 3
 
 
 def test_without_closures_or_a_file(addon, two_spheres):

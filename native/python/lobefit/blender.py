@@ -128,10 +128,9 @@ def simplify(
 def restore(path: str | os.PathLike[str], output: str | os.PathLike[str] | None) -> dict[str, Any]:
     """Puts back what simplified materials of a Blender file showed; returns their names."""
     _open(path)
-    import bpy
     from lobefit_addon.simplification import restore_all
 
-    result: dict[str, Any] = restore_all(bpy.context)
+    result: dict[str, Any] = restore_all()
     if output is not None:
         _save(output)
     return result
