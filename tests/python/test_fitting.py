@@ -9,7 +9,7 @@ import typing
 import lobefit
 import numpy as np
 import pytest
-from lobefit import fitting
+from lobefit import fitting, preview
 
 
 @pytest.fixture(scope="module")
@@ -152,6 +152,18 @@ def test_closures_of_a_record_without_its_measurement(recovered, tmp_path):
     with pytest.raises(lobefit.InputError, match=r"found no such file\.$") as caught:
         lobefit.closures(record, count=0)
     assert str(caught.value).startswith(f"{gone}: expected ")
+    assert lobefit.closures(record, target="lobe", count=0).closures[0]["target"] == "lobe"
+
+
+def test_closures_of_a_record_whose_measurement_was_replaced(recovered, tmp_path):
+    other = tmp_path / "other.binary"
+    lobefit._native.sample("nickel").write(str(other))
+    source = {**recovered.source, "path": str(other), "sha256": "0" * 64}
+    record = dataclasses.replace(recovered, source=source)
+    with pytest.raises(lobefit.InputError, match=r"found another file\.$") as caught:
+        lobefit.closures(record, count=0)
+    assert str(caught.value).startswith(f"{other}: expected ")
+    assert preview.measurement_of(record) is None
     assert lobefit.closures(record, target="lobe", count=0).closures[0]["target"] == "lobe"
 
 

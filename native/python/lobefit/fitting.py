@@ -10,7 +10,7 @@ from typing import Any
 
 from lobefit import _native
 from lobefit._native import Cancelled, InputError, Measurement
-from lobefit.origin import Origin, origin_of
+from lobefit.origin import Origin, is_unchanged, origin_of
 from lobefit.record import MODELS, Fit, Record, figure_of, without_nan
 
 Source = str | os.PathLike[str] | Measurement
@@ -207,11 +207,12 @@ class Job:
         if request.target == "lobe":
             return self._base_record().parameters
         if self._measurement is None:
-            path = self._base_record().source["path"]
-            if path is None or not Path(path).is_file():
+            record = self._base_record()
+            path = record.source["path"]
+            if not is_unchanged(record.source):
+                found = "another file" if path and Path(path).is_file() else "no such file"
                 raise InputError(
-                    f"{path or self._base_record().name}: expected the measurement of the record, "
-                    "found no such file."
+                    f"{path or record.name}: expected the measurement of the record, found {found}."
                 )
             self._measurement = read(path)
         return self._measurement

@@ -4,6 +4,7 @@ import csv
 import hashlib
 import io
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,14 @@ def origin_of(path: str | os.PathLike[str]) -> Origin:
     except OSError as error:
         raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
     return Origin(str(place), digest, _listed(place.parent).get(digest, {}).get("name"))
+
+
+def is_unchanged(source: Mapping[str, Any]) -> bool:
+    """Whether the file of a record's `source` is there, and is still the one that was fitted."""
+    path, digest = source["path"], source["sha256"]
+    if not path or not Path(path).is_file():
+        return False
+    return digest is None or origin_of(path).sha256 == digest
 
 
 def write_samples(folder: str | os.PathLike[str], names: list[str]) -> list[Path]:

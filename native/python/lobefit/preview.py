@@ -1,7 +1,6 @@
 """Figure 1 of Nielsen et al. for any material: measurement and fits under two lights."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from lobefit import _native, lettering, picture
 from lobefit._native import Measurement
+from lobefit.origin import is_unchanged
 from lobefit.picture import Image
 from lobefit.record import Record
 
@@ -50,9 +50,8 @@ class Row:
 
 
 def measurement_of(record: Record) -> Measurement | None:
-    """The measurement a record was fitted to, or None where its file is no longer there."""
-    path = record.source["path"]
-    return Measurement.read(path) if path and Path(path).is_file() else None
+    """The measurement a record was fitted to, or None where its file is gone or another one."""
+    return Measurement.read(record.source["path"]) if is_unchanged(record.source) else None
 
 
 def row(
