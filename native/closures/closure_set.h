@@ -21,6 +21,8 @@ struct SpecularClosure {
   RgbCurve weight;
 };
 
+inline constexpr int most_specular_closures = 3;
+
 // The sum of a diffuse closure and some specular ones, each times its weight.
 struct ClosureSet {
   RgbCurve diffuse;

@@ -13,8 +13,6 @@ struct ClosureFitOptions {
   int threads = 0;          // 0: every processor; the result is the same for any number
 };
 
-inline constexpr int most_specular_closures = 3;
-
 // The albedo toward the viewer of a target and of the closures, over the lights where the target is
 // known, and the part of the error that each view angle adds, in its own light.
 struct SeenAtAngle {

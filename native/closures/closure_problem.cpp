@@ -1,0 +1,332 @@
+#include "closures/closure_problem.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace lobefit {
+namespace {
+
+using enum ClosureLayout::ShapeCurve;
+constexpr int n = ViewSplines::count;
+
+// Cycles 4.2 takes anything with alpha_x alpha_y below 5e-7 for a mirror, and single precision
+// loses the peak of a lobe much narrower than this.
+const double least_log_alpha = std::log(0.002);
+
+struct Bounds {
+  Eigen::VectorXd least, greatest;
+};
+
+Bounds bounds_of(const ClosureLayout& layout) {
+  Bounds bounds{Eigen::VectorXd::Zero(layout.unknowns()),
+                Eigen::VectorXd::Constant(layout.unknowns(), 1e6)};
+  for (int k = 0; k < layout.specular; ++k) {
+    const auto set = [&](int curve, double least, double greatest) {
+      bounds.least.segment(layout.shape(k, curve) * n, n).setConstant(least);
+      bounds.greatest.segment(layout.shape(k, curve) * n, n).setConstant(greatest);
+    };
+    set(mean, least_log_alpha, 0);
+    set(spread, -3, 3);
+    set(bend, -3, 3);
+  }
+  return bounds;
+}
+
+// The values of all curves at one view angle, and the splines they come from.
+struct AtView {
+  ViewSplines::Support support;
+  Eigen::VectorXd curves;
+  double sine;
+};
+
+AtView at_view(const Eigen::VectorXd& x, double cosine) {
+  AtView at{ViewSplines::at(cosine), Eigen::VectorXd(x.size() / n),
+            std::sqrt(std::max(0.0, 1 - cosine * cosine))};
+  for (int curve = 0; curve < at.curves.size(); ++curve) {
+    double value = 0;
+    for (int i = 0; i < 4; ++i) {
+      value += at.support.share[static_cast<std::size_t>(i)] * x[curve * n + at.support.first + i];
+    }
+    at.curves[curve] = value;
+  }
+  return at;
+}
+
+// How far a closure may be bent at a view angle. Cycles bends a normal back whose mirror direction
+// of the viewer is not clear of the horizon: its height has to be .01, or .9 of the viewer's own.
+double least_tilt(double cosine) {
+  const double least_height = std::min(0.9 * cosine, 0.0105);
+  return -std::tan((std::asin(cosine) - std::asin(least_height)) / 2);
+}
+// No bend reaches the viewer itself.
+double greatest_tilt(double cosine, double sine) { return 0.8 * sine / cosine; }
+
+// A shape within what Cycles can show, and which of its numbers were clipped.
+struct ClippedShape {
+  Shape shape;
+  bool x_free, y_free, tilt_free;
+};
+
+ClippedShape clipped_shape(const AtView& at, const ClosureLayout& layout, int closure,
+                           double cosine) {
+  const double m = at.curves[layout.shape(closure, mean)];
+  const double h = at.curves[layout.shape(closure, spread)] * at.sine * at.sine;
+  const double t = at.curves[layout.shape(closure, bend)] * at.sine;
+  const auto clip = [](double value, double low, double high, bool& free) {
+    free = value > low && value < high;
+    return std::clamp(value, low, high);
+  };
+  ClippedShape result;
+  result.shape.log_alpha_x = clip(m - h, least_log_alpha, 0, result.x_free);
+  result.shape.log_alpha_y = clip(m + h, least_log_alpha, 0, result.y_free);
+  result.shape.tilt = clip(t, least_tilt(cosine), greatest_tilt(cosine, at.sine), result.tilt_free);
+  return result;
+}
+
+// |r| made smooth, sqrt(r^2 + e^2) - e, without loss of digits where r is small.
+double smooth(double r, double e) { return r * r / (std::sqrt(r * r + e * e) + e); }
+
+double view_error(const ClosureProblem& problem, const TargetView& view, const Eigen::VectorXd& x,
+                  double smoothing) {
+  const ClosureLayout& layout = problem.layout;
+  const AtView at = at_view(x, view.wo.z());
+  std::vector<Microfacet> closures;
+  for (int k = 0; k < layout.specular; ++k) {
+    closures.emplace_back(problem.distributions[static_cast<std::size_t>(k)],
+                          clipped_shape(at, layout, k, view.wo.z()).shape, view.wo);
+  }
+  const auto weights = [&](int closure) {
+    return Rgb(at.curves.segment<3>(layout.weight(closure, 0)).array());
+  };
+  double error = 0;
+  for (const TargetLight& light : view.lights) {
+    Rgb r = weights(layout.specular) * (light.wi.z() / pi) - light.reflected;
+    for (int k = 0; k < layout.specular; ++k) {
+      r += weights(k) * closures[static_cast<std::size_t>(k)].evaluate(light.wi, light.half);
+    }
+    const double e = smoothing * light.typical;
+    error += light.weight * (smooth(r[0], e) + smooth(r[1], e) + smooth(r[2], e));
+  }
+  return error;
+}
+
+// Gradient and reweighted least squares' matrix of view_error by the curves' values at the view.
+struct ViewEquations {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd gradient;
+};
+
+// The number of closures is known when this is compiled, so that its inner loops unroll.
+template <int specular>
+ViewEquations linearise_view(const ClosureProblem& problem, const TargetView& view,
+                             const Eigen::VectorXd& x, double smoothing) {
+  constexpr int own = shape_curves * specular + specular + 1;
+  const ClosureLayout& layout = problem.layout;
+  const AtView at = at_view(x, view.wo.z());
+  const double sine = at.sine;
+  std::vector<ClippedShape> shapes;
+  std::vector<Microfacet> closures;
+  for (int k = 0; k < specular; ++k) {
+    shapes.push_back(clipped_shape(at, layout, k, view.wo.z()));
+    closures.emplace_back(problem.distributions[static_cast<std::size_t>(k)], shapes.back().shape,
+                          view.wo);
+  }
+  // One channel depends on the shapes and on its own weights: the equations of the three channels
+  // are kept apart until all lights are in.
+  using Matrix = Eigen::Matrix<double, own, own>;
+  using Column = Eigen::Matrix<double, own, 1>;
+  std::array<Matrix, 3> matrices;
+  std::array<Column, 3> gradients;
+  matrices.fill(Matrix::Zero());
+  gradients.fill(Column::Zero());
+  Column row;
+  std::array<double, shape_curves * specular + 1> by_shape{};
+  for (const TargetLight& light : view.lights) {
+    for (int k = 0; k < specular; ++k) {
+      const ClippedShape& shape = shapes[static_cast<std::size_t>(k)];
+      const ShapeValue value =
+          closures[static_cast<std::size_t>(k)].evaluate_with_derivatives(light.wi, light.half);
+      const double by_x = shape.x_free ? value.by_log_alpha_x : 0;
+      const double by_y = shape.y_free ? value.by_log_alpha_y : 0;
+      double* const by = by_shape.data() + shape_curves * k;
+      by[mean] = value.value * (by_x + by_y);
+      by[spread] = value.value * (by_y - by_x) * sine * sine;
+      by[bend] = shape.tilt_free ? value.value * value.by_tilt * sine : 0;
+      row[shape_curves * specular + k] = value.value;
+    }
+    row[own - 1] = light.wi.z() / pi;
+    for (int c = 0; c < 3; ++c) {
+      double r = -light.reflected[c];
+      for (int k = 0; k <= specular; ++k) {
+        const double weight = at.curves[layout.weight(k, c)];
+        r += weight * row[shape_curves * specular + k];
+        for (int i = shape_curves * k; k < specular && i < shape_curves * (k + 1); ++i) {
+          row[i] = weight * by_shape[static_cast<std::size_t>(i)];
+        }
+      }
+      const double e = smoothing * light.typical;
+      const double weight = light.weight / std::sqrt(r * r + e * e);
+      auto& matrix = matrices[static_cast<std::size_t>(c)];
+      for (int j = 0; j < own; ++j) {
+        const double scaled = weight * row[j];
+        for (int i = j; i < own; ++i) matrix(i, j) += scaled * row[i];
+      }
+      gradients[static_cast<std::size_t>(c)] += (weight * r) * row;
+    }
+  }
+  ViewEquations sum{Eigen::MatrixXd::Zero(layout.curves(), layout.curves()),
+                    Eigen::VectorXd::Zero(layout.curves())};
+  for (int c = 0; c < 3; ++c) {
+    const auto place = [&](int i) {
+      return i < shape_curves * specular ? i : layout.weight(i - shape_curves * specular, c);
+    };
+    const auto& matrix = matrices[static_cast<std::size_t>(c)];
+    for (int j = 0; j < own; ++j) {
+      for (int i = j; i < own; ++i) sum.matrix(place(i), place(j)) += matrix(i, j);
+      sum.gradient[place(j)] += gradients[static_cast<std::size_t>(c)][j];
+    }
+  }
+  sum.matrix.triangularView<Eigen::StrictlyUpper>() = sum.matrix.transpose();
+  return sum;
+}
+
+ViewEquations linearise_view(const ClosureProblem& problem, const TargetView& view,
+                             const Eigen::VectorXd& x, double smoothing) {
+  static_assert(most_specular_closures == 3);
+  switch (problem.layout.specular) {
+    case 0:
+      return linearise_view<0>(problem, view, x, smoothing);
+    case 1:
+      return linearise_view<1>(problem, view, x, smoothing);
+    case 2:
+      return linearise_view<2>(problem, view, x, smoothing);
+    default:
+      return linearise_view<3>(problem, view, x, smoothing);
+  }
+}
+
+// A little curvature costs a little error, so that curves are smooth where the target does not say:
+// the square of second differences of the coefficients. Weights are counted in their own size.
+constexpr double shape_stiffness = 3e-6, weight_stiffness = 3e-6;
+
+struct Equations {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd gradient;
+};
+
+double stiffness_of(const ClosureLayout& layout, int curve) {
+  return curve < shape_curves * layout.specular ? shape_stiffness : weight_stiffness;
+}
+
+double stiffness_penalty(const ClosureLayout& layout, const Eigen::VectorXd& x) {
+  double penalty = 0;
+  for (int curve = 0; curve < layout.curves(); ++curve) {
+    for (int i = 1; i + 1 < n; ++i) {
+      const double* at = x.data() + curve * n + i;
+      const double bent = at[-1] - 2 * at[0] + at[1];
+      penalty += stiffness_of(layout, curve) / 2 * bent * bent;
+    }
+  }
+  return penalty;
+}
+
+void add_penalty(const ClosureLayout& layout, const Eigen::VectorXd& x, Equations& equations) {
+  const Eigen::Vector3d difference(1, -2, 1);
+  for (int curve = 0; curve < layout.curves(); ++curve) {
+    const double stiffness = stiffness_of(layout, curve);
+    for (int i = curve * n; i + 2 < (curve + 1) * n; ++i) {
+      equations.matrix.block<3, 3>(i, i) += stiffness * difference * difference.transpose();
+      equations.gradient.segment<3>(i) += stiffness * difference.dot(x.segment<3>(i)) * difference;
+    }
+  }
+}
+
+// Calls visit for every stride-th view of the problem.
+template <typename Visitor>
+void for_each_view(const ClosureProblem& problem, int stride, Visitor&& visit) {
+  for (std::size_t i = 0; i < problem.target->size(); i += static_cast<std::size_t>(stride)) {
+    visit((*problem.target)[i]);
+  }
+}
+
+Equations linearise(const ClosureProblem& problem, int stride, const Eigen::VectorXd& x,
+                    double smoothing) {
+  const int unknowns = problem.layout.unknowns(), curves = problem.layout.curves();
+  Equations sum{Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns)};
+  for_each_view(problem, stride, [&](const TargetView& view) {
+    const ViewEquations part = linearise_view(problem, view, x, smoothing);
+    const auto support = ViewSplines::at(view.wo.z());
+    const Eigen::Map<const Eigen::Vector4d> share(support.share.data());
+    const Eigen::Matrix4d both = stride * share * share.transpose();
+    for (int q = 0; q < curves; ++q) {
+      sum.gradient.segment<4>(q * n + support.first) += stride * part.gradient[q] * share;
+      for (int p = 0; p < curves; ++p) {
+        if (part.matrix(p, q) == 0) continue;
+        sum.matrix.block<4, 4>(p * n + support.first, q * n + support.first) +=
+            part.matrix(p, q) * both;
+      }
+    }
+  });
+  add_penalty(problem.layout, x, sum);
+  return sum;
+}
+
+// A damped step within the bounds. An unknown at its bound stays there while the error falls
+// outward.
+Eigen::VectorXd step_from(const Eigen::VectorXd& x, const Bounds& bounds,
+                          const Equations& equations, double damping) {
+  std::vector<int> free;
+  for (int i = 0; i < x.size(); ++i) {
+    const bool held =
+        equations.gradient[i] > 0 ? x[i] <= bounds.least[i] : x[i] >= bounds.greatest[i];
+    if (!held && equations.matrix(i, i) > 0) free.push_back(i);
+  }
+  Eigen::MatrixXd matrix = equations.matrix(free, free);
+  const Eigen::VectorXd gradient = equations.gradient(free);
+  const Eigen::VectorXd scale = matrix.diagonal().cwiseSqrt().cwiseInverse();
+  matrix = scale.asDiagonal() * matrix * scale.asDiagonal();
+  matrix.diagonal().array() += damping;
+  Eigen::VectorXd tried = x;
+  tried(free) -= scale.cwiseProduct(matrix.llt().solve(scale.cwiseProduct(gradient)).eval());
+  return tried.cwiseMax(bounds.least).cwiseMin(bounds.greatest);
+}
+
+}  // namespace
+
+Shape shape_at(const ClosureLayout& layout, const Eigen::VectorXd& x, int closure, double cosine) {
+  return clipped_shape(at_view(x, cosine), layout, closure, cosine).shape;
+}
+
+double smooth_error(const ClosureProblem& problem, int stride, const Eigen::VectorXd& x,
+                    double smoothing) {
+  double sum = 0;
+  for_each_view(problem, stride,
+                [&](const TargetView& view) { sum += view_error(problem, view, x, smoothing); });
+  return stride * sum + stiffness_penalty(problem.layout, x);
+}
+
+Eigen::VectorXd descend(const ClosureProblem& problem, int stride, Eigen::VectorXd x,
+                        double smoothing, int iterations, const Monitor& monitor) {
+  const Bounds bounds = bounds_of(problem.layout);
+  double error = smooth_error(problem, stride, x, smoothing), damping = 1e-3;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    monitor.throw_if_cancelled();
+    const Equations equations = linearise(problem, stride, x, smoothing);
+    const double before = error;
+    for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
+      const Eigen::VectorXd tried = step_from(x, bounds, equations, damping);
+      const double tried_error = smooth_error(problem, stride, tried, smoothing);
+      const bool better = tried_error < error;
+      if (better) {
+        x = tried;
+        error = tried_error;
+      }
+      damping = std::max(1e-9, damping * (better ? 0.2 : 8));
+    }
+    if (!(error < before * (1 - 1e-4))) break;
+  }
+  return x;
+}
+
+}  // namespace lobefit
