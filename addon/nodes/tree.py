@@ -15,6 +15,7 @@ from typing import Any, Self
 import bpy
 
 COLUMN_WIDTH = 180.0
+NODE_WIDTH = 150.0
 ROW_HEIGHT = 50.0
 OPEN_HEIGHT = 350.0
 FRAME_GAP = 80.0
@@ -204,7 +205,7 @@ class NodeFormulas:
             column = 1 + max((columns.get(other, -1) for other in before), default=-1)
             columns[node] = column
             y = heights.get(column, 0.0)
-            node.location = (column * COLUMN_WIDTH, y)
+            node.location, node.width = (column * COLUMN_WIDTH, y), NODE_WIDTH
             heights[column] = y - (ROW_HEIGHT if node.hide else OPEN_HEIGHT)
         return len(heights)
 
