@@ -25,7 +25,7 @@ def fit_only_once(monkeypatch, table, all_models):
 def test_all_but_blender_is_done_and_the_lack_is_named(table, tmp_path, capfd):
     assert demo.main([str(table), "-o", str(tmp_path / "demo")]) == 1
     out, err = capfd.readouterr()
-    assert err.count("\n") == 1 and "pip install 'lobefit[blender]'" in err
+    assert err.count("\n") == 1 and "pip install bpy" in err
     assert "truth" in out and "index.html" in out
     names = ["index.html", "materials.png", "records", "report.csv"]
     assert sorted(os.listdir(tmp_path / "demo")) == names

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lobefit._native import InputError
 from lobefit.atomic import written_aside
+from lobefit.fitting import TOLERANCE
 from lobefit.inputs import Progress
 from lobefit.record import Record
 
@@ -35,19 +36,29 @@ def need_blender() -> None:
         if importlib.util.find_spec(module) is None:
             raise InputError(
                 f"expected the Python module {module} to make a material, found none; install it "
-                "with: pip install 'lobefit[blender]'."
+                "with: pip install bpy."
             )
 
 
 def write_blend(
-    path: str | os.PathLike[str], record: Record, kind: str = "live", **options: Any
-) -> None:
+    path: str | os.PathLike[str],
+    record: Record,
+    kind: str = "live",
+    count: int | None = None,
+    tolerance: float = TOLERANCE,
+) -> tuple[str, float]:
     """Writes a Blender file with the material of a record on a sphere under two lights.
 
-    `kind` and `options` are those of `lobefit_addon.build_material`.
+    `kind`, `count` and `tolerance` are those of `lobefit_addon.build_material`. Returns what Cycles
+    shows, in a few words, and the part of the light that is off.
     """
-    _two_lights_scene([record], 512, kind, **options)
+    _two_lights_scene([record], 512, kind, count=count, tolerance=tolerance)
     _save(path)
+    from lobefit_addon.nodes.material import choose
+
+    choice = choose(record, kind, count, tolerance)
+    closures = f", {choice.count} specular closures" if choice.closures else ""
+    return choice.kind + closures, choice.error(record)
 
 
 def write_library(path: str | os.PathLike[str], records: list[Record], kind: str = "live") -> None:

@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -158,18 +159,19 @@ def _add_closures(commands: Any) -> None:
 
 def _add_closure_options(command: argparse.ArgumentParser) -> None:
     group = command.add_argument_group("closures")
-    group.add_argument(
+    number = group.add_mutually_exclusive_group()
+    number.add_argument(
         "--closures",
         type=_within(int, 0, MOST_CLOSURES, "a number"),
         default=2,
         metavar="N",
         help="specular closures besides the diffuse one; " + _DEFAULT,
     )
-    group.add_argument(
+    number.add_argument(
         "--tolerance",
         type=_within(float, 0, 1, "a part of the light"),
         metavar="E",
-        help="take as few as keep the error of spheres to this",
+        help="take as few as keep the error of spheres to this part of the light, 0.05 is 5 %%",
     )
     group.add_argument(
         "--cap-albedo", action="store_true", help="keep the albedo at 1 where a measurement is over"
@@ -337,7 +339,7 @@ def _fit(options: argparse.Namespace) -> int:
 def _closures(options: argparse.Namespace) -> int:
     request = Closures(options.target, options.closures, options.tolerance, options.cap_albedo)
     suffixes = (*MEASUREMENT_SUFFIXES, RECORD_SUFFIX)
-    return _write_records(options, suffixes, [request], _print_closures)
+    return _write_records(options, suffixes, [request], partial(_print_closures, request))
 
 
 def _write_records(
@@ -373,7 +375,7 @@ def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures
         return record_of(path, progress, closures=closures, **fitted)
 
 
-def _print_closures(record: Record, place: Path) -> None:
+def _print_closures(asked: Closures, record: Record, place: Path) -> None:
     print(f"{place}: {record.name}")
     for entry in record.closures:
         names = ", ".join(lobe["distribution"] for lobe in entry["specular"]) or "diffuse alone"
@@ -382,6 +384,9 @@ def _print_closures(record: Record, place: Path) -> None:
             f"{entry['error']:.4f}, {entry['seconds']:.2f} s"
         )
     print(f"   principled: sphere error {record.principled['error']:.4f}")
+    least = min(e["error"] for e in record.closures if e["target"] == asked.target)
+    if asked.tolerance is not None and least > asked.tolerance:
+        print(f"   none of {asked.target} keeps to {asked.tolerance:g}")
 
 
 def _print_fit(record: Record, place: Path) -> None:
@@ -409,6 +414,7 @@ def _preview(options: argparse.Namespace) -> int:
         size = options.size
         rows = [preview.row(record, preview.measurement_of(record), size) for record in records]
         picture.write_png(options.output, preview.sheet(rows, size))
+        print(options.output)
     return code
 
 
@@ -419,7 +425,10 @@ def _material(options: argparse.Namespace) -> int:
     requests = closures_for(options.kind, options.closures, tolerance, options.cap_albedo)
     record = _record(Path(options.file), options, requests)
     count = options.closures if options.kind in TARGETS else None
-    blender.write_blend(options.output, record, options.kind, count=count, tolerance=tolerance)
+    shown, error = blender.write_blend(options.output, record, options.kind, count, tolerance)
+    print(f"{options.output}: {record.name}, {shown}, {error:.1%} of the light is off")
+    if options.kind == "auto" and error > tolerance:
+        print(f"   none keeps to {tolerance:g}: this is the nearest")
     return DONE
 
 
@@ -444,6 +453,8 @@ def _simplify(options: argparse.Namespace) -> int:
         lines = simplified.lines(result)
         if options.time and result["seconds"]["after"] is None:
             _complain("rendering is timed in Cycles only, found a scene of another renderer.")
+    if options.output is None:
+        lines.append("nothing is written without -o OUT.blend")
     print(json.dumps(result) if options.json else "\n".join(lines))
     return DONE
 

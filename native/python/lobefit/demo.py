@@ -107,12 +107,12 @@ def _run(files: list[str], folder: Path) -> int:
     if demo.records:
         demo.attempt("the summary", demo.finish)
         print(_table(demo.records))
-    print(f"\nPictures, errors and run times: {folder / 'index.html'}")
+        print(f"\nPictures, errors and run times: {folder / 'index.html'}")
     return SOME_FAILED if demo.failures else DONE
 
 
 def _table(records: list[Record]) -> str:
-    wide = max(len(record.name) for record in records) + 2
+    wide = max(len("material"), *(len(record.name) for record in records)) + 2
     figure = figure_of(VISUAL_NORM)
     lines = [f"{'material':{wide}}{'model':22}{preview.FIGURES[figure]:>20}{'seconds':>9}"]
     for record in records:

@@ -31,7 +31,8 @@ def lines(result: Mapping[str, Any]) -> list[str]:
 
 def restored_lines(result: Mapping[str, Any]) -> list[str]:
     """What `blender.restore` put back."""
-    return [f"{name}: restored" for name in result["restored"]] + _skipped(result)
+    told = [f"{name}: restored" for name in result["restored"]] or ["nothing to restore"]
+    return told + _skipped(result)
 
 
 def _skipped(result: Mapping[str, Any]) -> list[str]:
