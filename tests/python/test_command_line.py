@@ -273,7 +273,24 @@ def test_simplify_and_restore(tmp_path, blend, capfd):
     table = capfd.readouterr().out.splitlines()
     assert table[0].split()[:3] == ["material", "before", "after"]
     assert table[1].startswith("truth ")
-    assert table[-1] == "lit by 1 Sun"
+    assert table[-2:] == ["lit by 1 Sun", "nothing is written without -o OUT.blend"]
+    assert main(["simplify", str(back), "--restore"]) == 0
+    assert capfd.readouterr().out.splitlines()[0] == "nothing to restore"
+
+
+def test_closures_say_when_a_tolerance_is_out_of_reach(tmp_path, table, capfd):
+    place = tmp_path / "record.json"
+    assert (
+        main(["closures", str(table), "--target", "lobe", "--tolerance", "0", "-o", str(place)])
+        == 0
+    )
+    assert capfd.readouterr().out.splitlines()[-1].strip() == "none of lobe keeps to 0"
+    arguments = ["--target", "lobe", "--tolerance", "1", "-o", str(place)]
+    assert main(["closures", str(place), *arguments]) == 0
+    assert "none of" not in capfd.readouterr().out
+    assert "not allowed with" in refuse(
+        capfd, "closures", place, "--closures", "1", "--tolerance", "1", "-o", place
+    )
 
 
 def test_simplify_refuses_what_it_cannot_do(tmp_path, blend, capfd):
