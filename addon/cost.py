@@ -18,6 +18,7 @@ import bpy
 from mathutils import Vector
 
 from .nodes.tree import empty_shader_tree
+from .scene import uniform_world
 
 Name = TypeVar("Name")
 
@@ -82,11 +83,12 @@ def measure_costs(
     return {name: Cost(min(each), statistics.median(each)) for name, each in times.items()}
 
 
-def diffuse_material(name: str = "Diffuse") -> bpy.types.Material:
-    """A new material of one white Diffuse BSDF, the least a surface can cost."""
+def diffuse_material(name: str = "Diffuse", albedo: float = 1.0) -> bpy.types.Material:
+    """A new material of one grey Diffuse BSDF, the least a surface can cost."""
     material = bpy.data.materials.new(name)
     tree = empty_shader_tree(material)
     shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    shader.inputs["Color"].default_value = (albedo, albedo, albedo, 1.0)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return material
@@ -138,23 +140,13 @@ def _scene(lights: str) -> tuple[bpy.types.Scene, bpy.types.Object]:
         sun.energy, sun.angle = 1.0, 0.0
         _add(scene, sun).rotation_euler = Vector(_SUN).to_track_quat("Z", "Y").to_euler()
     elif lights == "world":
-        scene.world = _white_world()
+        scene.world = uniform_world("Cost", 1.0)
     else:
         lamp = bpy.data.lights.new("Cost", "AREA")
         lamp.energy, lamp.size = 100.0, 1.0
         _add(scene, lamp).location = (0.0, 0.0, 2.9)
     _set_up_cycles(scene, _BOUNCES[lights])
     return scene, item
-
-
-def _white_world() -> bpy.types.World:
-    world = bpy.data.worlds.new("Cost")
-    tree = empty_shader_tree(world)
-    background = tree.nodes.new("ShaderNodeBackground")
-    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    output = tree.nodes.new("ShaderNodeOutputWorld")
-    tree.links.new(background.outputs[0], output.inputs["Surface"])
-    return world
 
 
 def _mesh(walls: bool) -> bpy.types.Mesh:

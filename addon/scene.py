@@ -14,6 +14,8 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from .nodes.tree import empty_shader_tree
+
 # Directions toward the lights, seen from a camera at +z with x to the right and y up: one from the
 # upper right, one behind the lower left that grazes the rim.
 LIGHTS = {"Upper Right": (1.0, 1.0, 1.2), "Grazing": (-1.0, -1.0, -0.55)}
@@ -44,6 +46,17 @@ def two_lights_scene(material: bpy.types.Material | None, size: int) -> bpy.type
     # A white diffuse surface that faces a light is white in the picture.
     scene.view_settings.exposure = float(np.log2(np.pi))
     return scene
+
+
+def uniform_world(name: str, radiance: float) -> bpy.types.World:
+    """A new world, grey and the same from everywhere."""
+    world = bpy.data.worlds.new(name)
+    tree = empty_shader_tree(world)
+    background = tree.nodes.new("ShaderNodeBackground")
+    background.inputs["Color"].default_value = (radiance, radiance, radiance, 1.0)
+    output = tree.nodes.new("ShaderNodeOutputWorld")
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    return world
 
 
 def render(scene: bpy.types.Scene, path: str | os.PathLike[str]) -> None:

@@ -1,6 +1,5 @@
 """What has to be found out before a scene is simplified, in steps that change no data-block."""
 
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -132,15 +131,14 @@ class Survey:
 def _lacks(record: Any) -> list[Any]:
     """The closures that the record has no entry for, if its measurement is there."""
     from lobefit.fitting import MOST_CLOSURES, Closures
+    from lobefit.origin import is_unchanged
 
-    path = record.source["path"]
-    if not path or not Path(path).is_file():
-        return []
     measured = [entry for entry in record.closures if entry["target"] == "measured"]
     known = {entry["count"] for entry in measured}
     capped = any(entry["cap_albedo"] for entry in measured)
-    return [
+    lacking = [
         Closures("measured", count, cap_albedo=capped)
         for count in range(MOST_CLOSURES + 1)
         if count not in known
     ]
+    return lacking if lacking and is_unchanged(record.source) else []

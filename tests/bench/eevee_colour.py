@@ -22,8 +22,7 @@ from lobefit.fitting import Closures
 from lobefit.inputs import record_of
 from lobefit.record import VISUAL_NORM
 from lobefit_addon import build_material
-from lobefit_addon.nodes.tree import empty_shader_tree
-from lobefit_addon.scene import radiance, two_lights_scene
+from lobefit_addon.scene import radiance, two_lights_scene, uniform_world
 from numpy.typing import NDArray
 
 SIZE, SAMPLES, SKY, SUN = 96, {"EEVEE": 16, "Cycles": 256}, 0.3, 2.0
@@ -38,12 +37,7 @@ def set_up_scene() -> bpy.types.Scene:
     key, grazing = (item for item in scene.objects if item.type == "LIGHT")
     bpy.data.objects.remove(grazing)
     key.data.energy, key.data.angle = SUN, math.radians(2)
-    scene.world = bpy.data.worlds.new("sky")
-    tree = empty_shader_tree(scene.world)
-    background = tree.nodes.new("ShaderNodeBackground")
-    background.inputs["Color"].default_value = (SKY, SKY, SKY, 1.0)
-    output = tree.nodes.new("ShaderNodeOutputWorld")
-    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    scene.world = uniform_world("sky", SKY)
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     scene.cycles.samples = SAMPLES["Cycles"]
     scene.eevee.taa_render_samples = SAMPLES["EEVEE"]

@@ -25,8 +25,8 @@ from lobefit.fitting import MOST_CLOSURES, Closures
 from lobefit.inputs import record_of
 from lobefit.record import VISUAL_NORM
 from lobefit_addon import build_material
-from lobefit_addon.nodes.tree import empty_shader_tree
-from lobefit_addon.scene import radiance, sphere_mesh
+from lobefit_addon.cost import diffuse_material
+from lobefit_addon.scene import radiance, sphere_mesh, uniform_world
 from lobefit_addon.swaps import tree_content
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
@@ -96,15 +96,7 @@ def fill_steps(materials: Sequence[bpy.types.Material]) -> None:
 
 def grey() -> bpy.types.Material:
     """The material of all boards."""
-    material = bpy.data.materials.get("board")
-    if material is None:
-        material = bpy.data.materials.new("board")
-        tree = empty_shader_tree(material)
-        diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-        diffuse.inputs["Color"].default_value = (0.1, 0.1, 0.1, 1.0)
-        output = tree.nodes.new("ShaderNodeOutputMaterial")
-        tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
-    return material
+    return bpy.data.materials.get("board") or diffuse_material("board", 0.1)
 
 
 def add_camera(scene: bpy.types.Scene) -> None:
@@ -123,12 +115,7 @@ def add_lights(scene: bpy.types.Scene) -> None:
         sun = bpy.data.lights.new("sun", "SUN")
         sun.energy, sun.angle = strength, np.radians(angle)
         add(sun, turned_to(toward, "Z"))
-    scene.world = bpy.data.worlds.new("sky")
-    tree = empty_shader_tree(scene.world)
-    background = tree.nodes.new("ShaderNodeBackground")
-    background.inputs["Color"].default_value = (SKY, SKY, SKY, 1.0)
-    output = tree.nodes.new("ShaderNodeOutputWorld")
-    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    scene.world = uniform_world("sky", SKY)
 
 
 def set_up_cycles(scene: bpy.types.Scene, width: int) -> None:
