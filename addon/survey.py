@@ -26,8 +26,8 @@ class Survey:
         self.skipped: dict[int, str] = {}
         self.problem = problem_of_camera(scene)
         self._scene_uid = scene.session_uid
-        # Records that lack closures; not known before all frames were looked at.
-        self._lacking: list[Any] | None = None
+        # Records and the closures they lack; not known before all frames were looked at.
+        self._lacking: list[tuple[Any, list[Any]]] | None = None
         self._lacked = 0
         self._job: Any = None
         self._read()
@@ -54,7 +54,7 @@ class Survey:
             return "Done"
         if self._lacking is None:
             return f"Frame {self.frames[len(self.views)]}"
-        return f"Closures of {self._lacking[0].name}"
+        return f"Closures of {self._lacking[0][0].name}"
 
     def advance(self, seconds: float) -> bool:
         """Looks at one frame, or waits at most `seconds` for closures; says whether all is done."""
@@ -105,16 +105,18 @@ class Survey:
         if len(self.views) == len(self.frames):
             present = self.present()
             records = {id(record): record for uid, record in self.records.items() if uid in present}
-            self._lacking = [record for record in records.values() if _lacks(record)]
+            lacking = [(record, _lacks(record)) for record in records.values()]
+            self._lacking = [(record, closures) for record, closures in lacking if closures]
             self._lacked = len(self._lacking)
 
     def _find_closures(self, seconds: float) -> None:
         import lobefit
 
-        before = after = self._lacking[0]
+        before, closures = self._lacking[0]
+        after = before
         try:
             if self._job is None:
-                self._job = lobefit.start_fit(before, closures=_lacks(before))
+                self._job = lobefit.start_fit(before, closures=closures)
             if not self._job.wait(seconds):
                 return
             after = self._job.record()
