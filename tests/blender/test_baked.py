@@ -24,6 +24,15 @@ from facets import (
 )
 from lobefit import _native
 from mathutils import Matrix, Vector
+from surroundings import (
+    Crowd,
+    albedo,
+    bend_as_crowds_do,
+    connect_normal,
+    group_node,
+    unit,
+    white_world_albedo,
+)
 
 PHASES = (8, 47, 101, 152)
 # The tables through which curves are read have 256 steps, and the points of curves stand on them.
@@ -97,14 +106,6 @@ def build(addon, nickel):
     return built
 
 
-def group_node(material):
-    return next(node for node in material.node_tree.nodes if node.type == "GROUP")
-
-
-def connect_normal(material, socket):
-    material.node_tree.links.new(socket, group_node(material).inputs["Normal"])
-
-
 def bend_normal(material, offset):
     """Connects the surface's normal plus an offset."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -113,10 +114,6 @@ def bend_normal(material, offset):
     bent.inputs[1].default_value = offset
     links.new(nodes.new("ShaderNodeNewGeometry").outputs["Normal"], bent.inputs[0])
     connect_normal(material, bent.outputs[0])
-
-
-def unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def brightest(closures, light, rng):
@@ -305,98 +302,22 @@ def test_a_normal_map_bends_the_closures(build, render, tmp_path, nickel, phase)
     assert relative_l1(rendered, expected, where) < 1e-3
 
 
-def quadrature(cosine, rings=400, sectors=180):
-    """Lights (N, 3) by half vectors that crowd at the normal, their solid angles, and the view."""
-    viewer = np.array([(1 - cosine**2) ** 0.5, 0.0, cosine])
-    t, phi = np.meshgrid(
-        (np.arange(rings) + 0.5) / rings, (np.arange(sectors) + 0.5) / sectors * 2 * np.pi
-    )
-    t, phi = t.ravel(), phi.ravel()
-    theta = t**2 * np.pi / 2
-    half = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    incidence = half @ viewer
-    lights = 2 * incidence[:, None] * half - viewer
-    solid_angle = 4 * incidence * np.sin(theta) * (t * np.pi / rings) * (2 * np.pi / sectors)
-    on = (incidence > 0) & (lights[:, 2] > 0)
-    return lights[on], solid_angle[on], np.tile(viewer, (on.sum(), 1))
-
-
-def albedo(closures, cosine):
-    lights, solid_angle, viewers = quadrature(cosine)
-    return solid_angle @ _native.evaluate_closures(closures, lights, viewers)
-
-
 @pytest.mark.parametrize("angle", [0, 20, 40, 60, 70, 80])
 @pytest.mark.parametrize("kind", ["fitted", "hand-made"])
 def test_a_white_world_shows_the_albedo(addon, build, tmp_path, nickel, kind, angle):
     closures = nickel.closures[0]
     if kind == "hand-made":
         closures = entry(lobe("beckmann", 0.4, 0.6, 0.3), lobe("ggx", 0.5, -0.6, -0.3))
-    scene = new_scene(SIZE, samples=64)
-    scene.cycles.max_bounces = 1
-    scene.world = bpy.data.worlds.new("white")
-    nodes = addon.nodes.tree.empty_shader_tree(scene.world)
-    background = nodes.nodes.new("ShaderNodeBackground")
-    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    nodes.links.new(background.outputs[0], nodes.nodes.new("ShaderNodeOutputWorld").inputs[0])
-    mesh = bpy.data.meshes.new("plane")
-    corners = [(-99, -99, 0), (99, -99, 0), (99, 99, 0), (-99, 99, 0)]
-    mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
-    mesh.materials.append(build(closures))
-    add(scene, mesh)
-    place = Matrix.Rotation(np.radians(angle), 4, "Y") @ Matrix.Translation((0, 0, 9))
-    add_camera(scene, place, width=1.0)
+    white = addon.scene.uniform_world("white", 1.0)
+    rendered = white_world_albedo(tmp_path, build(closures), white, angle)
     expected = albedo(closures, np.cos(np.radians(angle)))
-    rendered = pixels_of(scene, tmp_path).mean(0)
-    # Noise is below 1e-4 with 64 samples a pixel; but Cycles does not sample a Beckmann closure
+    # Noise is below 1e-4; but Cycles does not sample a Beckmann closure
     # quite as it evaluates it, which is up to 0.7 %.
     assert np.allclose(rendered, expected, rtol=0.01)
 
 
-class Crowd:
-    """Facets with any normal, any smooth normal, any connected normal and any of some materials."""
-
-    def __init__(self, materials, size, seed):
-        rng = np.random.default_rng(seed)
-
-        def near(normals, spread):
-            return unit(normals + spread * rng.normal(0, 1, normals.shape))
-
-        count = size**2
-        self.flat = near(np.tile(UP, (count, 1)), 3.0)
-        self.flat[:, 2] = np.maximum(np.abs(self.flat[:, 2]), 0.02)
-        self.flat = unit(self.flat)
-        self.smooth, self.bent = near(self.flat, 0.5), near(self.flat, 0.5)
-        # Some are not bent, and some face the viewer exactly.
-        self.bent[::5] = self.smooth[::5]
-        self.flat[::7] = self.smooth[::7] = self.bent[::7] = UP
-        self.mesh = facet_mesh(self.flat)
-        self.mesh.shade_smooth()
-        self.mesh.normals_split_custom_set(np.repeat(self.smooth, 4, axis=0).tolist())
-        lengths = rng.uniform(0.1, 3, (count, 1))
-        bent = self.mesh.attributes.new("bent", "FLOAT_VECTOR", "FACE")
-        bent.data.foreach_set("vector", (self.bent * lengths).ravel().astype(np.float32))
-        for material in materials:
-            attribute = material.node_tree.nodes.new("ShaderNodeAttribute")
-            attribute.attribute_name = "bent"
-            connect_normal(material, attribute.outputs["Vector"])
-            self.mesh.materials.append(material)
-        which = rng.integers(0, len(materials), count).astype(np.int32)
-        self.mesh.polygons.foreach_set("material_index", which)
-
-    def faults(self, folder, light):
-        """How many pixels are not finite or negative, and how many are black without a reason."""
-        rendered = render_facets(folder, self.mesh, light)
-        # Cycles shows no diffuse closure whose normal is turned away from the smooth one.
-        lit = (self.smooth * self.bent).sum(1) > 0.1
-        for normals in (self.flat, self.smooth, self.bent):
-            lit &= (normals @ light > 0.1) & (normals[:, 2] > 0.01)
-        wrong = ~np.isfinite(rendered).all(1) | (rendered < 0).any(1)
-        return wrong.sum(), (lit & (rendered <= 0).any(1)).sum(), lit.sum()
-
-
 def crowd_entries(nickel):
-    """Closures on a bright diffuse one, which alone would light a pixel: NaN makes it black."""
+    """Closures as extreme as any on a bright diffuse one."""
     return [
         nickel.closures[0] | {"diffuse": WEIGHT},
         entry(lobe("ggx", 0.05, 0.9, 3.0), diffuse=WEIGHT),
@@ -407,7 +328,7 @@ def crowd_entries(nickel):
 
 @pytest.mark.parametrize("phase", (0, 35, 120))
 def test_nothing_is_black_or_infinite(build, tmp_path, nickel, phase):
-    materials = [build(closures) for closures in crowd_entries(nickel)]
+    materials = [bend_as_crowds_do(build(closures)) for closures in crowd_entries(nickel)]
     wrong, black, lit = Crowd(materials, 200, phase).faults(tmp_path, light_at(phase))
     assert lit > 1000
     assert (wrong, black) == (0, 0)
