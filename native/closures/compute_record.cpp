@@ -14,9 +14,9 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::shared_ptr<const Measurement> open(const MeasurementSource& source) {
+std::shared_ptr<const Measurement> open(const MeasurementSource& source, int threads) {
   if (const auto* path = std::get_if<std::filesystem::path>(&source)) {
-    return std::make_shared<const Measurement>(read_measurement(*path));
+    return std::make_shared<const Measurement>(read_measurement(*path, threads));
   }
   return std::get<std::shared_ptr<const Measurement>>(source);
 }
@@ -43,7 +43,7 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   const Clock::time_point start = Clock::now();
   RecordContents contents;
   monitor.report("Reading", 0);
-  const std::shared_ptr<const Measurement> measurement = open(source);
+  const std::shared_ptr<const Measurement> measurement = open(source, options.threads);
   contents.bins = measurement->bins();
   contents.measurement = measurement;
   contents.read_seconds = seconds_since(start);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "closures/closure_problem.h"
-#include "fitting/parallel.h"
+#include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "closures/principled.h"
 #include "closures/principled_terms.h"
-#include "fitting/parallel.h"
+#include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {

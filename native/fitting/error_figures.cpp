@@ -1,9 +1,11 @@
 #include "fitting/error_figures.h"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
-#include "fitting/parallel.h"
+#include "fitting/kernel.h"
+#include "measurement/parallel.h"
 #include "reflectance/fresnel.h"
 
 namespace lobefit {
@@ -13,8 +15,8 @@ namespace {
 struct Misfit {
   Rgb error = Rgb::Zero(), mass = Rgb::Zero();
 
-  void add(double weight, const Rgb& model, const Rgb& measured) {
-    error += weight * (model - measured).abs();
+  void add(double weight, const Rgb& distance, const Rgb& measured) {
+    error += weight * distance;
     mass += weight * measured;
   }
   void add(const Misfit& other) {
@@ -39,28 +41,72 @@ struct Misfits {
   }
 };
 
-Misfits misfits_of_row(const Measurement& measurement, const Parameters& parameters, int h) {
+// A model sees cos^2 phi_d alone: one evaluation serves phi_d and 180 deg - phi_d. A row of folded
+// bins is padded to what the kernel takes at once.
+constexpr int folded_phi_bins = Measurement::phi_d_bins / 2;
+using Row = Eigen::Array<double, (folded_phi_bins + 3) / 4 * 4, 1>;
+
+// The model and what its misfit weighs on the folded bins of one theta_h and theta_d.
+struct FoldedRow {
+  std::array<Row, 3> model;
+  Row lower_cosine;  // of light and viewer
+  Row weight;        // solid angle and both cosines
+};
+
+class RowFiller {
+ public:
+  explicit RowFiller(const Parameters& parameters) : lobe_(as_interpolated(parameters)) {
+    cos_phi_.setZero();
+    for (int p = 0; p < folded_phi_bins; ++p) cos_phi_[p] = t_.cos_phi[p];
+  }
+
+  FoldedRow operator()(int h, int d) const {
+    const double sin2_h = square(t_.sin_h[h]), cos2_h = square(t_.cos_h[h]);
+    const double along = t_.cos_h[h] * t_.cos_d[d], across = t_.sin_h[h] * t_.sin_d[d];
+    // See LobeCoordinates.
+    const Row u_phong =
+        2 * sin2_h * (square(t_.cos_d[d]) + square(t_.sin_d[d]) * cos_phi_.square());
+    const Row u_blinn = Row::Constant(sin2_h * (1 + cos2_h));
+    const double fresnel = lobe_.ior ? fresnel_reflectance(t_.cos_d[d], *lobe_.ior).value : 1;
+    FoldedRow row;
+    Row power;
+    for (int c = 0; c < 3; ++c) {
+      if (c == 0 || lobe_.exponent[c] != lobe_.exponent[c - 1]) {
+        run_powers({Row::SizeAtCompileTime, u_phong.data(), u_blinn.data(), lobe_.exponent[c],
+                    lobe_.interpolation},
+                   power.data());
+      }
+      row.model[static_cast<std::size_t>(c)] =
+          lobe_.diffuse[c] / pi + lobe_.specular[c] * fresnel * power;
+    }
+    const double width = h + 0.5;  // dtheta_h, up to a factor
+    row.lower_cosine = along - across * cos_phi_;
+    row.weight = (t_.sin_h[h] * width * t_.sin_d[d] * t_.cos_d[d]) * row.lower_cosine *
+                 (along + across * cos_phi_);
+    return row;
+  }
+
+ private:
+  const BinCentres& t_ = bin_centres();
+  const Parameters lobe_;
+  Row cos_phi_;
+};
+
+Misfits misfits_of_row(const Measurement& measurement, const RowFiller& fill, int h) {
   static const double cos_80 = std::cos(radians(80));
-  constexpr int last = Measurement::phi_d_bins - 1;
   Misfits sums;
   for (int d = 0; d < Measurement::theta_d_bins; ++d) {
-    // A model sees cos^2 phi_d alone: one evaluation serves phi_d and 180 deg - phi_d.
-    for (int p = 0; p <= last / 2; ++p) {
-      const bool valid[2] = {measurement.valid(h, d, p), measurement.valid(h, d, last - p)};
-      if (!valid[0] && !valid[1]) continue;
-      const HalfDifference centre = Measurement::centre(h, d, p);
-      const Directions directions = to_directions(centre);
-      const double cos_i = directions.wi.z(), cos_o = directions.wo.z();
-      const Rgb model = evaluate_model(parameters, centre);
-      const double width = h + 0.5;  // dtheta_h, up to a factor
-      const double weight = std::sin(centre.theta_h) * width * std::sin(centre.theta_d) *
-                            std::cos(centre.theta_d) * cos_i * cos_o;
-      for (int half = 0; half < 2; ++half) {
-        if (!valid[half]) continue;
-        const Rgb measured = measurement.bin(h, d, half ? last - p : p);
-        sums.plain.add(1, model, measured);
-        if (std::min(cos_i, cos_o) > cos_80) sums.within_80.add(1, model, measured);
-        sums.cosine.add(weight, model, measured);
+    const FoldedRow row = fill(h, d);
+    const double* const values = measurement.planes().data() + Measurement::index(h, d, 0);
+    for (int p = 0; p < folded_phi_bins; ++p) {
+      for (const int bin : {p, Measurement::phi_d_bins - 1 - p}) {
+        if (std::isnan(values[bin])) continue;
+        const Rgb measured(values[bin], values[bin + Measurement::bin_count],
+                           values[bin + 2 * Measurement::bin_count]);
+        const Rgb error = (Rgb(row.model[0][p], row.model[1][p], row.model[2][p]) - measured).abs();
+        sums.plain.add(1, error, measured);
+        if (row.lower_cosine[p] > cos_80) sums.within_80.add(1, error, measured);
+        sums.cosine.add(row.weight[p], error, measured);
       }
     }
   }
@@ -72,8 +118,9 @@ Misfits misfits_of_row(const Measurement& measurement, const Parameters& paramet
 ErrorFigures error_figures(const Measurement& measurement, const Parameters& parameters,
                            int threads) {
   std::vector<Misfits> rows(Measurement::theta_h_bins);
+  const RowFiller fill(parameters);
   parallel_for(Measurement::theta_h_bins, threads, [&](int h) {
-    rows[static_cast<std::size_t>(h)] = misfits_of_row(measurement, parameters, h);
+    rows[static_cast<std::size_t>(h)] = misfits_of_row(measurement, fill, h);
   });
   Misfits total;
   for (const Misfits& row : rows) total.add(row);

@@ -8,19 +8,19 @@
 
 #include "fitting/minimise.h"
 #include "fitting/objective.h"
-#include "fitting/parallel.h"
 #include "fitting/samples.h"
 #include "fitting/scan.h"
 #include "fitting/variables.h"
+#include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {
 
 using Eigen::VectorXd;
 
-// Samples of the scan, and of the polish of its candidates: the latter is some 2 % of a table.
-constexpr std::size_t scan_samples = 3000, candidate_samples = 12000;
-constexpr std::size_t max_candidates = 6;
+// Samples of the scan, of the polish of its candidates, and of that of the best of these.
+constexpr std::size_t scan_samples = 1000, candidate_samples = 3000, finalist_samples = 20000;
+constexpr std::size_t max_candidates = 6, max_finalists = 2;
 // Starts that end this close to the best one, relatively, have found the same optimum.
 constexpr double agreement = 0.005;
 constexpr const char* scan_stage = "Looking for starts";
@@ -81,46 +81,72 @@ class Fitter {
   }
 
   VectorXd run_polish(std::vector<Candidate> candidates) {
-    monitor_.report("Trying the starts", 0.3);
     const Stopwatch watch;
-    const Samples some = subsample(all_, candidate_samples);
-    std::vector<Minimum> minima(candidates.size());
-    parallel_for(static_cast<int>(candidates.size()), threads_, [&](int i) {
-      minima[static_cast<std::size_t>(i)] =
-          stages_and_polish(some, candidates[static_cast<std::size_t>(i)].x);
-    });
-    std::sort(minima.begin(), minima.end(), [](const Minimum& left, const Minimum& right) {
-      return left.true_value < right.true_value;
+    monitor_.report("Trying the starts", 0.3);
+    const Samples few = subsample(all_, candidate_samples);
+    std::vector<Minimum> minima = for_each_start(starts_of(candidates), [&](const VectorXd& start) {
+      return stages_and_polish(few, start);
     });
     judge_certainty(minima);
-    const int iterations =
-        std::accumulate(minima.begin(), minima.end(), 0,
-                        [](int sum, const Minimum& m) { return sum + m.iterations; });
-    fit_.stages.push_back(
-        {"stages and polish of " + std::to_string(minima.size()) + " starts on a subsample",
-         mean_error(minima.front().x), watch.seconds(), iterations});
+    monitor_.report("Trying the best of them", 0.5);
+    const Samples some = subsample(all_, finalist_samples);
+    minima.resize(std::min(minima.size(), max_finalists));
+    const std::vector<Minimum> finalists =
+        for_each_start(starts_of(minima), [&](const VectorXd& start) {
+          return minimise(some, variables_, options_.norm, held_back(start, variables_.all()),
+                          start, finishing_precision(), 1, monitor_);
+        });
     monitor_.report("Polishing on all bins", 0.6);
-    return run_stage("polish on all bins", variables_.all(), minima.front().x,
-                     finishing_precision());
+    const VectorXd& best = finalists.front().x;
+    fit_.stages.push_back({"polish of " + std::to_string(candidates.size()) +
+                               " starts on a subsample, then of the best on a larger one",
+                           mean_error(best), watch.seconds(),
+                           iterations_of(minima) + iterations_of(finalists)});
+    return run_stage("polish on all bins", variables_.all(), best, last_precision());
+  }
+
+  template <typename Start>
+  static std::vector<VectorXd> starts_of(const std::vector<Start>& starts) {
+    std::vector<VectorXd> points;
+    for (const Start& start : starts) points.push_back(start.x);
+    return points;
+  }
+
+  // The minima from all starts, best first.
+  template <typename Work>
+  std::vector<Minimum> for_each_start(const std::vector<VectorXd>& starts, const Work& work) const {
+    std::vector<Minimum> minima(starts.size());
+    parallel_for(static_cast<int>(starts.size()), threads_, [&](int i) {
+      const auto at = static_cast<std::size_t>(i);
+      minima[at] = work(starts[at]);
+    });
+    std::stable_sort(minima.begin(), minima.end(), [](const Minimum& left, const Minimum& right) {
+      return left.true_value < right.true_value;
+    });
+    return minima;
+  }
+
+  static int iterations_of(const std::vector<Minimum>& minima) {
+    return std::accumulate(minima.begin(), minima.end(), 0,
+                           [](int sum, const Minimum& m) { return sum + m.iterations; });
   }
 
   // A start with alpha at 0 or 1 keeps it there until the polish on all bins, so that the result is
   // no worse than the pure Phong or Blinn-Phong lobe: for s near 0 the objective jumps where bins
   // leave the lobe, and a subsample sees too few of those.
-  Minimum stages_and_polish(const Samples& samples, const VectorXd& start) const {
+  std::vector<int> held_back(const VectorXd& start, std::vector<int> free) const {
     const int alpha = variables_.interpolation();
-    const bool held = alpha >= 0 && is_pure(start[alpha]);
-    const auto held_back = [&](std::vector<int> free) {
-      if (held) std::erase(free, alpha);
-      return free;
-    };
+    if (alpha >= 0 && is_pure(start[alpha])) std::erase(free, alpha);
+    return free;
+  }
+
+  Minimum stages_and_polish(const Samples& samples, const VectorXd& start) const {
     Minimum minimum{start, 0, 0, false};
     for (const std::vector<int>& free :
-         {variables_.reflectances(), held_back(variables_.shape()),
-          held_back(variables_.shape_and_specular()), held_back(variables_.all())}) {
+         {variables_.shape(), variables_.shape_and_specular(), variables_.all()}) {
       const int before = minimum.iterations;
-      minimum = minimise(samples, variables_, options_.norm, free, minimum.x, coarse_precision(), 1,
-                         monitor_);
+      minimum = minimise(samples, variables_, options_.norm, held_back(start, free), minimum.x,
+                         coarse_precision(), 1, monitor_);
       minimum.iterations += before;
     }
     return minimum;

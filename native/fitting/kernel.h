@@ -43,4 +43,13 @@ enum class KernelNorm { smoothed_l1, l2, log_l2 };
 // Fastest version that this processor can run; both give the same to rounding.
 KernelSums run_kernel(const KernelInput& input, KernelNorm norm);
 
+// base^s of `count` lobe coordinates, a multiple of 4; 0 where the base is not positive.
+struct PowerInput {
+  std::size_t count;
+  const double* u_phong;
+  const double* u_blinn;
+  double exponent, interpolation;
+};
+void run_powers(const PowerInput& input, double* powers);
+
 }  // namespace lobefit

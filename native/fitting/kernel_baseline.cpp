@@ -1,16 +1,31 @@
+#include "fitting/kernel_avx2.h"
 #include "fitting/kernel_lanes.inc"
 
 namespace lobefit {
 
 #if defined(__x86_64__)
-KernelSums run_kernel_avx2(const KernelInput& input, KernelNorm norm);
+
+namespace {
+bool has_avx2() {
+  static const bool has = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  return has;
+}
+}  // namespace
 
 KernelSums run_kernel(const KernelInput& input, KernelNorm norm) {
-  static const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return avx2 ? run_kernel_avx2(input, norm) : sum_norm(input, norm);
+  return has_avx2() ? run_kernel_avx2(input, norm) : sum_norm(input, norm);
 }
+
+void run_powers(const PowerInput& input, double* powers) {
+  return has_avx2() ? run_powers_avx2(input, powers) : fill_powers(input, powers);
+}
+
 #else
+
 KernelSums run_kernel(const KernelInput& input, KernelNorm norm) { return sum_norm(input, norm); }
+
+void run_powers(const PowerInput& input, double* powers) { fill_powers(input, powers); }
+
 #endif
 
 }  // namespace lobefit

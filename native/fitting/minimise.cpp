@@ -80,7 +80,7 @@ void solve_level(const Objective& objective, const std::vector<int>& free,
   std::vector<int> moved;
   for (int round = 0; round < max_rounds; ++round) {
     monitor.throw_if_cancelled();
-    const VectorXd gradient = objective.evaluate(minimum.x).gradient;
+    const VectorXd gradient = objective.evaluate(minimum.x, Curvature::newton).gradient;
     std::vector<int> now = movable(objective.variables(), free, minimum.x, gradient);
     if (now.empty() || (minimum.converged && now == moved)) return;
     moved = std::move(now);
@@ -94,7 +94,8 @@ bool has_smoothing(Norm norm) { return norm == Norm::l1 || norm == Norm::cosine_
 
 Precision coarse_precision() { return {{0.3, 0.1, 0.03}, 1e-5, 60}; }
 Precision fine_precision() { return {{0.1, 0.03, 0.01}, 1e-7, 100}; }
-Precision finishing_precision() { return {{0.03, 0.01}, 1e-7, 100}; }
+Precision finishing_precision() { return {{0.03, 0.01}, 1e-6, 100}; }
+Precision last_precision() { return {{0.01}, 1e-6, 30}; }
 
 Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const VectorXd& x, const Precision& precision,
@@ -106,7 +107,7 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
     const Objective objective(samples, variables, norm, precision.smoothing[level], threads);
     current.converged = false;
     solve_level(objective, free, precision, monitor, current);
-    current.true_value = objective.evaluate(current.x).true_value;
+    current.true_value = objective.evaluate(current.x, Curvature::newton).true_value;
     const double gain = best.true_value - current.true_value;
     if (gain > 0) best = current;
     best.iterations = current.iterations;

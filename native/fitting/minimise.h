@@ -28,6 +28,7 @@ struct Precision {
 Precision coarse_precision();     // to choose between starts
 Precision fine_precision();       // from anywhere
 Precision finishing_precision();  // from close by
+Precision last_precision();       // from the minimum of a subsample
 
 // Moves the variables `free` from x, level by level of smoothing, until the unsmoothed objective
 // stops improving, within the bounds: a variable at its bound is held there while its gradient

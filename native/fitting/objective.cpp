@@ -1,10 +1,12 @@
 #include "fitting/objective.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "fitting/kernel.h"
-#include "fitting/parallel.h"
+#include "measurement/parallel.h"
 #include "reflectance/fresnel.h"
 
 namespace lobefit {
@@ -144,7 +146,16 @@ void add(KernelSums& total, const KernelSums& part) {
 
 }  // namespace
 
-Evaluation Objective::evaluate(const VectorXd& x, Curvature curvature) const {
+const Evaluation& Objective::evaluate(const VectorXd& x, Curvature curvature) const {
+  const auto known = std::find_if(answers_.begin(), answers_.end(), [&](const Answer& answer) {
+    return answer.curvature == curvature && answer.x.size() == x.size() && answer.x == x;
+  });
+  if (known == answers_.end()) answers_.back() = {x, curvature, pass(x, curvature)};
+  if (known != answers_.begin()) std::swap(answers_.front(), answers_.back());
+  return answers_.front().evaluation;
+}
+
+Evaluation Objective::pass(const VectorXd& x, Curvature curvature) const {
   const Assembly assembly(variables_, x);
   const int groups = assembly.groups(), runs = static_cast<int>(samples_.runs.size());
   std::vector<KernelSums> sums(static_cast<std::size_t>(runs * groups));

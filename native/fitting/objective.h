@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "fitting/samples.h"
 #include "fitting/variables.h"
@@ -32,19 +33,30 @@ class Objective {
         smoothing_(smoothing),
         threads_(threads) {}
 
-  // One pass over the samples; x within its bounds. The same bits for any number of threads,
-  // because each run is summed by itself and the runs in their order.
-  Evaluation evaluate(const Eigen::VectorXd& x, Curvature curvature = Curvature::reweighted) const;
+  // One pass over the samples, or none where the same was asked a moment ago; x within its bounds.
+  // The same bits for any number of threads, because each run is summed by itself and the runs in
+  // their order. The answer is good until the second next question. Not to be asked by two threads.
+  const Evaluation& evaluate(const Eigen::VectorXd& x,
+                             Curvature curvature = Curvature::reweighted) const;
 
   const Variables& variables() const { return variables_; }
   double smoothing() const { return smoothing_; }
 
  private:
+  Evaluation pass(const Eigen::VectorXd& x, Curvature curvature) const;
+
   const Samples& samples_;
   const Variables& variables_;
   Norm norm_;
   double smoothing_;
   int threads_;
+  // A solver comes back to the point it stands at after a step that led nowhere.
+  struct Answer {
+    Eigen::VectorXd x;
+    Curvature curvature;
+    Evaluation evaluation;
+  };
+  mutable std::array<Answer, 2> answers_;  // the latest first
 };
 
 }  // namespace lobefit

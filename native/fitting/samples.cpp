@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "measurement/parallel.h"
 #include "reflectance/model.h"
 
 namespace lobefit {
@@ -10,20 +11,24 @@ namespace {
 
 constexpr int folded_phi_bins = Measurement::phi_d_bins / 2;
 
-// The median of the finite values of all channels, or something positive in its place: values of
-// a table that is mostly zero are measured by their mean, those of an all-zero one by 1.
-double typical_reflectance(const Measurement& measurement) {
+// The median of the finite values of all channels, found from one in `stride`, or something
+// positive in its place: values of a table that is mostly zero are measured by their mean, those of
+// an all-zero one by 1. It is a unit alone, so that a few thousand values tell it well enough.
+double typical_reflectance(const Measurement& measurement, std::size_t stride = 61) {
+  constexpr std::size_t enough = 1000;
+  const auto planes = measurement.planes();
   std::vector<double> values;
-  values.reserve(3 * static_cast<std::size_t>(measurement.bins().valid));
   double sum = 0;
-  for (const double value : measurement.planes()) {
-    if (std::isnan(value)) continue;
-    values.push_back(value);
-    sum += value;
+  for (std::size_t i = 0; i < planes.size(); i += stride) {
+    if (std::isnan(planes[i])) continue;
+    values.push_back(planes[i]);
+    sum += planes[i];
   }
-  if (values.empty()) return 1;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
+  if (values.size() >= enough && *middle > 0) return *middle;
+  if (stride > 1) return typical_reflectance(measurement, 1);
+  if (values.empty()) return 1;
   if (*middle > 0) return *middle;
   return sum > 0 ? sum / static_cast<double>(values.size()) : 1;
 }
@@ -62,56 +67,90 @@ void end_run(Samples& samples) {
   if (samples.runs.back().begin == padded) samples.runs.pop_back();
 }
 
+// Fills the run of each theta_d. Its samples are all bins above the horizon and within max_angle,
+// found by geometry alone, so that every run has its place before any is filled; invalid ones have
+// the weight 0.
 class Builder {
  public:
   Builder(const Measurement& measurement, const FitOptions& options)
       : measurement_(measurement),
         norm_(options.norm),
+        threads_(thread_count(options.threads)),
         min_cosine_(std::cos(radians(std::min(options.max_angle_degrees, 90.0)))) {
     samples_.unit = typical_reflectance(measurement);
-    const auto expected = static_cast<std::size_t>(measurement.bins().valid) / 2;
-    for_each_column(samples_, [expected](auto& column) { column.reserve(expected); });
   }
 
   Samples build() {
+    std::size_t size = 0;
     for (int d = 0; d < Measurement::theta_d_bins; ++d) {
-      begin_run(samples_, std::cos(Measurement::centre(0, d, 0).theta_d));
+      Samples::Run run{size, size, t_.cos_d[d]};
       for (int h = 0; h < Measurement::theta_h_bins; ++h) {
-        for (int p = 0; p < folded_phi_bins; ++p) add(h, d, p);
+        run.end += static_cast<std::size_t>(folded_phi_bins - first_phi(h, d));
       }
-      end_run(samples_);
+      if (run.end == run.begin) continue;
+      run.end = (run.end + Samples::padding - 1) / Samples::padding * Samples::padding;
+      size = run.end;
+      samples_.runs.push_back(run);
+      theta_d_.push_back(d);
     }
+    for_each_column(samples_, [size](auto& column) { column.resize(size); });
+    parallel_for(static_cast<int>(samples_.runs.size()), threads_, [&](int r) { fill_run(r); });
     return std::move(samples_);
   }
 
  private:
-  void add(int h, int d, int p) {
-    const int mirrored = Measurement::phi_d_bins - 1 - p;
-    const bool first = measurement_.valid(h, d, p), second = measurement_.valid(h, d, mirrored);
-    if (!first && !second) return;
-    const HalfDifference centre = Measurement::centre(h, d, p);
-    const Directions directions = to_directions(centre);
-    const double cos_i = directions.wi.z(), cos_o = directions.wo.z();
-    if (std::min(cos_i, cos_o) <= min_cosine_) return;
-    const LobeCoordinates at = lobe_coordinates(centre);
-    samples_.u_phong.push_back(at.u_phong);
-    samples_.u_blinn.push_back(at.u_blinn);
-    double weight = first && second ? 1 : 0.5;
-    if (norm_ == Norm::cosine_l1) weight *= solid_angle_and_cosines(h, centre, cos_i * cos_o);
-    samples_.weight.push_back(static_cast<float>(weight));
-    const Rgb values[2] = {measurement_.bin(h, d, first ? p : mirrored),
-                           measurement_.bin(h, d, second ? mirrored : p)};
-    for (int c = 0; c < 3; ++c) {
-      for (int half = 0; half < 2; ++half) {
-        samples_.measured[c][half].push_back(stored(values[half][c]));
+  // The first phi_d of folded ones above the horizon: those after it stand higher.
+  int first_phi(int h, int d) const {
+    const double along = t_.cos_h[h] * t_.cos_d[d], across = t_.sin_h[h] * t_.sin_d[d];
+    int p = 0;
+    while (p < folded_phi_bins && along - across * t_.cos_phi[p] <= min_cosine_) ++p;
+    return p;
+  }
+
+  void fill_run(int r) {
+    const int d = theta_d_[static_cast<std::size_t>(r)];
+    std::size_t at = samples_.runs[static_cast<std::size_t>(r)].begin;
+    for (int h = 0; h < Measurement::theta_h_bins; ++h) {
+      const int first = first_phi(h, d);
+      fill_row(h, d, first, at);
+      at += static_cast<std::size_t>(folded_phi_bins - first);
+    }
+  }
+
+  // The samples of one theta_h and theta_d, written from `at` on. Phi_d enters the lobe through its
+  // squared cosine alone, see LobeCoordinates.
+  void fill_row(int h, int d, int first, std::size_t at) {
+    const double sin2_h = square(t_.sin_h[h]), cos2_h = square(t_.cos_h[h]);
+    const double along = t_.cos_h[h] * t_.cos_d[d], across = t_.sin_h[h] * t_.sin_d[d];
+    const double scale = solid_angle(h, d);
+    const int row = Measurement::index(h, d, 0);
+    const double* const values = measurement_.planes().data() + row;
+    for (int p = first; p < folded_phi_bins; ++p, ++at) {
+      const double cos2_phi = square(t_.cos_phi[p]);
+      samples_.u_phong[at] = 2 * sin2_h * (square(t_.cos_d[d]) + square(t_.sin_d[d]) * cos2_phi);
+      samples_.u_blinn[at] = sin2_h * (1 + cos2_h);
+      const int mirrored = Measurement::phi_d_bins - 1 - p;
+      const bool here = !std::isnan(values[p]), there = !std::isnan(values[mirrored]);
+      if (!here && !there) continue;
+      double weight = here && there ? 1 : 0.5;
+      if (norm_ == Norm::cosine_l1) {
+        weight *= scale * (square(along) - square(across) * cos2_phi);
+      }
+      samples_.weight[at] = static_cast<float>(weight);
+      const int bins[2] = {here ? p : mirrored, there ? mirrored : p};
+      for (std::size_t c = 0; c < 3; ++c) {
+        for (std::size_t half = 0; half < 2; ++half) {
+          const double value = values[static_cast<int>(c) * Measurement::bin_count + bins[half]];
+          samples_.measured[c][half][at] = stored(value);
+        }
       }
     }
   }
 
-  // sin(theta_h) dtheta_h sin(theta_d) cos(theta_d) cos(theta_i) cos(theta_o), to a mean near 1.
-  static double solid_angle_and_cosines(int h, const HalfDifference& centre, double cosines) {
+  // sin(theta_h) dtheta_h sin(theta_d) cos(theta_d) to a mean near 1 with both cosines.
+  double solid_angle(int h, int d) const {
     const double step = 2 * (h + 0.5) / Measurement::theta_h_bins;
-    return 8 * std::sin(centre.theta_h) * step * std::sin(2 * centre.theta_d) * cosines;
+    return 16 * t_.sin_h[h] * step * t_.sin_d[d] * t_.cos_d[d];
   }
 
   float stored(double reflectance) const {
@@ -119,10 +158,13 @@ class Builder {
     return static_cast<float>(norm_ == Norm::log_l2 ? std::log(value + log_offset) : value);
   }
 
+  const BinCentres& t_ = bin_centres();
   const Measurement& measurement_;
   const Norm norm_;
+  const int threads_;
   const double min_cosine_;
   Samples samples_;
+  std::vector<int> theta_d_;  // of each run
 };
 
 // How far a sample stands from the median of 1, all channels and both halves pooled.

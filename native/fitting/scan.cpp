@@ -1,24 +1,25 @@
 #include "fitting/scan.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
-#include "fitting/objective.h"
-#include "fitting/parallel.h"
+#include "fitting/kernel.h"
+#include "measurement/parallel.h"
+#include "reflectance/fresnel.h"
 
 namespace lobefit {
 namespace {
 
 using Eigen::VectorXd;
 
-// Log s from .1 to 3e5 in quarters of a decade; alpha; eta - 1 from a weak dielectric to a metal.
-constexpr int exponent_steps = 27;
+// Log s from .1 to 3e5 in thirds of a decade; alpha; eta - 1 from a weak dielectric to a metal.
+constexpr int exponent_steps = 20, steps_a_decade = 3;
 constexpr std::array<double, 5> interpolations = {0, 0.25, 0.5, 0.75, 1};
 constexpr std::array<double, 4> excess_iors = {0.15, 0.5, 1.5, 6};
 
-double log_exponent_at(int step) { return std::log(10) * (-1 + 0.25 * step); }
+double log_exponent_at(int step) { return std::log(10) * (double(step) / steps_a_decade - 1); }
 
 // The columns of the grid: one for every (alpha, eta) that the model has.
 struct Grid {
@@ -26,33 +27,131 @@ struct Grid {
   int columns() const { return interpolations_used * iors_used; }
 };
 
-// Newton steps of the reweighted squares for rho_d and k_s, channel by channel; the smoothing
-// falls from coarse to fine while they run.
-double solve_reflectances(const Samples& samples, const Variables& variables, Norm norm,
-                          VectorXd& x) {
-  constexpr std::array<double, 5> smoothing = {0.5, 0.2, 0.1, 0.05, 0.03};
-  Evaluation at;
-  for (const double e : smoothing) {
-    at = Objective(samples, variables, norm, e, 1).evaluate(x);
-    for (int c = 0; c < 3; ++c) {
-      const std::array<int, 2> dk = {Variables::diffuse + c, Variables::specular + c};
-      Eigen::Matrix2d hessian = at.hessian(dk, dk);
-      hessian.diagonal() *= 1 + 1e-9;
-      const double determinant = hessian.determinant();
-      if (!(determinant > 0)) continue;
-      const Eigen::Vector2d step = hessian.inverse() * Eigen::Vector2d(at.gradient(dk));
-      for (int i = 0; i < 2; ++i) x[dk[i]] = std::max(0.0, x[dk[i]] - step[i]);
+// Finds reflectances channel by channel, in single precision, which tells basins apart as well as
+// any.
+class ReflectanceSolver {
+ public:
+  using Column = Eigen::ArrayXf;
+
+  ReflectanceSolver(const Samples& samples, Norm norm)
+      : norm_(norm),
+        linear_(norm == Norm::l1 || norm == Norm::cosine_l1),
+        weight_(column(samples.weight)) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t half = 0; half < 2; ++half) {
+        measured_[c][half] = column(samples.measured[c][half]);
+      }
     }
   }
-  return at.true_value;
+
+  // The rho_d/pi and k_s >= 0 of a lobe g that fit a channel best, from a guess: Newton steps of
+  // the reweighted squares, whose smoothing falls from coarse to fine. Returns the sum of weight
+  // |r|, or of weight r^2 for the square norms.
+  double solve(int channel, const Column& g, float& diffuse, float& specular) const {
+    for (const float smoothing : {0.3F, 0.1F, 0.03F}) {
+      const Sums sums = sums_at(channel, g, diffuse, specular, smoothing);
+      const float determinant = sums.w * sums.wgg * (1 + 1e-5F) - sums.wg * sums.wg;
+      const float d = diffuse - (sums.wgg * sums.r - sums.wg * sums.rg) / determinant;
+      const float k = specular - (sums.w * sums.rg - sums.wg * sums.r) / determinant;
+      if (!(determinant > 0 && std::isfinite(d) && std::isfinite(k))) continue;
+      diffuse = std::max(0.0F, d);
+      specular = std::max(0.0F, k);
+    }
+    return sums_at(channel, g, diffuse, specular, 0.03F).true_value;
+  }
+
+ private:
+  // As KernelSums.
+  struct Sums {
+    float w = 0, wg = 0, wgg = 0, r = 0, rg = 0, true_value = 0;
+  };
+
+  static Column column(const std::vector<float>& from) {
+    return Eigen::Map<const Column>(from.data(), static_cast<Eigen::Index>(from.size()));
+  }
+
+  Sums sums_at(int channel, const Column& g, float diffuse, float specular, float smoothing) const {
+    Sums sums;
+    Column model = diffuse + specular * g, slope;
+    if (norm_ == Norm::log_l2) {
+      slope = (model + static_cast<float>(log_offset)).inverse();
+      model = -slope.log();
+    }
+    for (const Column& measured : measured_[static_cast<std::size_t>(channel)]) {
+      const Column r = model - measured;
+      Column w = weight_;
+      if (linear_) w /= (r.square() / (smoothing * smoothing) + 1).sqrt();
+      sums.true_value += linear_ ? (weight_ * r.abs()).sum() : (weight_ * r.square()).sum();
+      Column wr = w * r;
+      if (norm_ == Norm::log_l2) {
+        wr *= slope;
+        w *= slope.square();
+      }
+      sums.w += w.sum();
+      sums.r += wr.sum();
+      sums.rg += (wr * g).sum();
+      w *= g;
+      sums.wg += w.sum();
+      sums.wgg += (w * g).sum();
+    }
+    return sums;
+  }
+
+  const Norm norm_;
+  const bool linear_;
+  const Column weight_;
+  std::array<std::array<Column, 2>, 3> measured_;
+};
+
+// The lobe of reflectance 1 at all samples: R_F base^s.
+ReflectanceSolver::Column lobe_at(const Samples& samples, const Parameters& lobe) {
+  Eigen::ArrayXd g(static_cast<Eigen::Index>(samples.size()));
+  run_powers({samples.size(), samples.u_phong.data(), samples.u_blinn.data(), lobe.exponent[0],
+              lobe.interpolation},
+             g.data());
+  for (const Samples::Run& run : samples.runs) {
+    if (!lobe.ior) break;
+    g.segment(static_cast<Eigen::Index>(run.begin),
+              static_cast<Eigen::Index>(run.end - run.begin)) *=
+        fresnel_reflectance(run.cos_theta_d, *lobe.ior).value;
+  }
+  return g.cast<float>();
 }
 
-VectorXd shape_of(const Variables& variables, int step, int a, int e) {
+// The best exponent of one column; its alpha and eta are those of x, where it starts.
+Candidate scan_column(const Samples& samples, const Variables& variables,
+                      const ReflectanceSolver& solver, VectorXd x, const Monitor& monitor) {
+  Candidate best{x, std::numeric_limits<double>::infinity()};
+  for (int step = 0; step < exponent_steps; ++step) {
+    monitor.throw_if_cancelled();
+    const double log_exponent = log_exponent_at(step);
+    x.segment(Variables::log_exponent, variables.exponents()).setConstant(log_exponent);
+    const auto g = lobe_at(samples, as_interpolated(variables.to_parameters(x, 1)));
+    const double scale = specular_scale(variables.kind(), std::exp(log_exponent));
+    double value = 0;
+    // The reflectances of one exponent are close to those of the next.
+    for (int c = 0; c < 3; ++c) {
+      auto diffuse = static_cast<float>(x[Variables::diffuse + c]);
+      auto specular = static_cast<float>(scale * x[Variables::specular + c]);
+      value += solver.solve(c, g, diffuse, specular);
+      x[Variables::diffuse + c] = diffuse;
+      x[Variables::specular + c] = specular / scale;
+    }
+    if (value < best.true_value) best = {x, value};
+  }
+  return best;
+}
+
+// Where a column begins: diffuse alone.
+VectorXd column_start(const Variables& variables, int a, int e) {
   VectorXd x = VectorXd::Zero(variables.count());
   x.segment<3>(Variables::diffuse).setOnes();
-  x.segment(Variables::log_exponent, variables.exponents()).setConstant(log_exponent_at(step));
-  if (variables.interpolation() >= 0) x[variables.interpolation()] = interpolations[a];
-  if (variables.log_excess_ior() >= 0) x[variables.log_excess_ior()] = std::log(excess_iors[e]);
+  if (variables.interpolation() >= 0) {
+    x[variables.interpolation()] = interpolations[static_cast<std::size_t>(a)];
+  }
+  if (variables.log_excess_ior() >= 0) {
+    x[variables.log_excess_ior()] = std::log(excess_iors[static_cast<std::size_t>(e)]);
+  }
   return x;
 }
 
@@ -80,16 +179,12 @@ std::vector<Candidate> scan_shapes(const Samples& few, const Variables& variable
                                    std::size_t count, int threads, const Monitor& monitor) {
   const Grid grid{variables.interpolation() >= 0 ? static_cast<int>(interpolations.size()) : 1,
                   variables.log_excess_ior() >= 0 ? static_cast<int>(excess_iors.size()) : 1};
+  const ReflectanceSolver solver(few, norm);
   std::vector<Candidate> best(static_cast<std::size_t>(grid.columns()));
   parallel_for(grid.columns(), threads, [&](int column) {
     const int a = column % grid.interpolations_used, e = column / grid.interpolations_used;
-    Candidate& least = best[static_cast<std::size_t>(column)];
-    for (int step = 0; step < exponent_steps; ++step) {
-      monitor.throw_if_cancelled();
-      VectorXd x = shape_of(variables, step, a, e);
-      const double value = solve_reflectances(few, variables, norm, x);
-      if (step == 0 || value < least.true_value) least = {x, value};
-    }
+    best[static_cast<std::size_t>(column)] =
+        scan_column(few, variables, solver, column_start(variables, a, e), monitor);
   });
   std::sort(best.begin(), best.end(), [](const Candidate& left, const Candidate& right) {
     return left.true_value < right.true_value;

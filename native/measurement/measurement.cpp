@@ -4,22 +4,16 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <utility>
+
+#include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
-struct Trigonometry {
-  std::array<double, Measurement::theta_h_bins> cos_h, sin_h;
-  std::array<double, Measurement::theta_d_bins> cos_d, sin_d;
-  std::array<double, Measurement::phi_d_bins> cos_phi;
-};
-
-Trigonometry trigonometry_of_centres() {
-  Trigonometry t;
+BinCentres make_bin_centres() {
+  BinCentres t;
   for (int h = 0; h < Measurement::theta_h_bins; ++h) {
     const double angle = Measurement::centre(h, 0, 0).theta_h;
     t.cos_h[h] = std::cos(angle);
@@ -34,6 +28,34 @@ Trigonometry trigonometry_of_centres() {
     t.cos_phi[p] = std::cos(Measurement::centre(0, 0, p).phi_d);
   }
   return t;
+}
+
+// Makes invalid bins of the h-th theta_h NaN, and counts.
+BinCounts sift(int h, const Measurement::Rows& rows) {
+  const BinCentres& t = bin_centres();
+  BinCounts counts;
+  for (int d = 0; d < Measurement::theta_d_bins; ++d) {
+    const double along = t.cos_h[h] * t.cos_d[d], across = t.sin_h[h] * t.sin_d[d];
+    double* const red = rows[0] + d * Measurement::phi_d_bins;
+    double* const green = rows[1] + d * Measurement::phi_d_bins;
+    double* const blue = rows[2] + d * Measurement::phi_d_bins;
+    for (int p = 0; p < Measurement::phi_d_bins; ++p) {
+      const bool below = along <= across * std::abs(t.cos_phi[p]);
+      // No comparison with NaN holds; a sum that overflows is of numbers that mean nothing.
+      const bool finite = std::abs(red[p]) + std::abs(green[p]) + std::abs(blue[p]) <=
+                          std::numeric_limits<double>::max();
+      const bool negative = red[p] < 0 || green[p] < 0 || blue[p] < 0;
+      const bool valid = !below && finite && !negative;
+      counts.below_horizon += below;
+      counts.non_finite += !below && !finite;
+      counts.negative += !below && finite && negative;
+      counts.valid += valid;
+      red[p] = valid ? red[p] : nan_value;
+      green[p] = valid ? green[p] : nan_value;
+      blue[p] = valid ? blue[p] : nan_value;
+    }
+  }
+  return counts;
 }
 
 // The two grid points around a coordinate and the share of the upper one.
@@ -56,43 +78,47 @@ Neighbours periodic_neighbours(double coordinate, int bins) {
 
 }  // namespace
 
-Measurement::Measurement(std::vector<double> planes) : planes_(std::move(planes)) {
-  if (planes_.size() != 3 * static_cast<std::size_t>(bin_count)) {
-    throw std::invalid_argument("a measurement has three planes of 90 x 90 x 180 values");
-  }
-  const Trigonometry t = trigonometry_of_centres();
-  double* const red = planes_.data();
-  double* const green = red + bin_count;
-  double* const blue = green + bin_count;
-  for (int h = 0; h < theta_h_bins; ++h) {
-    for (int d = 0; d < theta_d_bins; ++d) {
-      const double along = t.cos_h[h] * t.cos_d[d];
-      const double across = t.sin_h[h] * t.sin_d[d];
-      for (int p = 0; p < phi_d_bins; ++p) {
-        const int i = index(h, d, p);
-        int* reason = &bins_.valid;
-        if (along <= across * std::abs(t.cos_phi[p])) {
-          reason = &bins_.below_horizon;
-        } else if (!(std::isfinite(red[i]) && std::isfinite(green[i]) && std::isfinite(blue[i]))) {
-          reason = &bins_.non_finite;
-        } else if (red[i] < 0 || green[i] < 0 || blue[i] < 0) {
-          reason = &bins_.negative;
-        }
-        ++*reason;
-        if (reason != &bins_.valid) red[i] = green[i] = blue[i] = nan_value;
-      }
-    }
+Measurement::Measurement(const FillRows& fill, int threads)
+    : planes_(std::make_unique_for_overwrite<double[]>(3 * static_cast<std::size_t>(bin_count))) {
+  std::array<BinCounts, theta_h_bins> counts;
+  parallel_for(theta_h_bins, thread_count(threads), [&](int h) {
+    double* const first = planes_.get() + index(h, 0, 0);
+    const Rows rows = {first, first + bin_count, first + 2 * bin_count};
+    fill(h, rows);
+    counts[static_cast<std::size_t>(h)] = sift(h, rows);
+  });
+  for (const BinCounts& each : counts) {
+    bins_.valid += each.valid;
+    bins_.below_horizon += each.below_horizon;
+    bins_.negative += each.negative;
+    bins_.non_finite += each.non_finite;
   }
 }
 
+Measurement::Measurement(std::span<const double> planes)
+    : Measurement(
+          [planes](int h, const Rows& rows) {
+            for (int c = 0; c < 3; ++c) {
+              const auto from = planes.begin() + index(h, 0, 0) + c * bin_count;
+              std::copy(from, from + row_size, rows[static_cast<std::size_t>(c)]);
+            }
+          },
+          1) {}
+
 Measurement Measurement::tabulate(const std::function<Rgb(const HalfDifference&)>& reflectance) {
-  std::vector<double> planes(3 * static_cast<std::size_t>(bin_count));
-  for (int i = 0; i < bin_count; ++i) {
-    const int p = i % phi_d_bins, row = i / phi_d_bins;
-    const Rgb value = reflectance(centre(row / theta_d_bins, row % theta_d_bins, p));
-    for (int c = 0; c < 3; ++c) planes[i + c * bin_count] = value[c];
-  }
-  return Measurement(std::move(planes));
+  return Measurement(
+      [&](int h, const Rows& rows) {
+        for (int i = 0; i < row_size; ++i) {
+          const Rgb value = reflectance(centre(h, i / phi_d_bins, i % phi_d_bins));
+          for (int c = 0; c < 3; ++c) rows[static_cast<std::size_t>(c)][i] = value[c];
+        }
+      },
+      1);
+}
+
+const BinCentres& bin_centres() {
+  static const BinCentres centres = make_bin_centres();
+  return centres;
 }
 
 HalfDifference Measurement::centre(int h, int d, int p) {
@@ -101,7 +127,7 @@ HalfDifference Measurement::centre(int h, int d, int p) {
 }
 
 Rgb Measurement::bin(int h, int d, int p) const {
-  const double* value = planes_.data() + index(h, d, p);
+  const double* value = planes_.get() + index(h, d, p);
   return {value[0], value[bin_count], value[2 * bin_count]};
 }
 

@@ -1,8 +1,10 @@
 // A measured isotropic reflectance on the half-difference grid of the MERL database.
 #pragma once
 
+#include <array>
 #include <functional>
-#include <vector>
+#include <memory>
+#include <span>
 
 #include "measurement/half_difference.h"
 #include "measurement/vector3.h"
@@ -28,9 +30,20 @@ class Measurement {
   static constexpr int phi_d_bins = 180;
   static constexpr int bin_count = theta_h_bins * theta_d_bins * phi_d_bins;
 
-  // Takes three planes (red, green, blue) of bin_count values in 1/sr, phi_d running fastest, then
-  // theta_d. All three channels of every invalid bin become NaN.
-  explicit Measurement(std::vector<double> planes);
+  static constexpr int row_size = theta_d_bins * phi_d_bins;
+
+  // Three rows (red, green, blue) of row_size values in 1/sr: the bins of one theta_h, phi_d
+  // running fastest.
+  using Rows = std::array<double*, 3>;
+  // Fills the rows of the h-th theta_h; may be called from several threads at once.
+  using FillRows = std::function<void(int h, const Rows& rows)>;
+
+  // Filled row by row on up to `threads` threads (0: every processor). All three channels of every
+  // invalid bin become NaN.
+  explicit Measurement(const FillRows& fill, int threads = 0);
+  // From three planes (red, green, blue) of bin_count values in 1/sr, phi_d running fastest, then
+  // theta_d.
+  explicit Measurement(std::span<const double> planes);
 
   // The table of a reflectance given at half-difference angles; bins below the horizon are invalid.
   static Measurement tabulate(const std::function<Rgb(const HalfDifference&)>& reflectance);
@@ -50,11 +63,22 @@ class Measurement {
   const BinCounts& bins() const { return bins_; }
 
   // Three planes of bin_count values, NaN where invalid.
-  const std::vector<double>& planes() const { return planes_; }
+  std::span<const double> planes() const {
+    return {planes_.get(), 3 * static_cast<std::size_t>(bin_count)};
+  }
 
  private:
-  std::vector<double> planes_;
+  std::unique_ptr<double[]> planes_;
   BinCounts bins_;
 };
+
+// Sines and cosines of the bins' centres, of which all that a bin's directions and lobes are made.
+// The cosines of light and viewer are cos_h cos_d -+ sin_h sin_d cos_phi.
+struct BinCentres {
+  std::array<double, Measurement::theta_h_bins> cos_h, sin_h;
+  std::array<double, Measurement::theta_d_bins> cos_d, sin_d;
+  std::array<double, Measurement::phi_d_bins> cos_phi;
+};
+const BinCentres& bin_centres();
 
 }  // namespace lobefit

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -119,13 +120,6 @@ void check_size(const std::filesystem::path& path, std::uintmax_t expected, std:
                                    : "; there is something behind the table."));
 }
 
-void read_values(const std::filesystem::path& path, std::FILE* file, std::vector<double>& values) {
-  if (std::fread(values.data(), sizeof(double), values.size(), file) != values.size()) {
-    fail(path, "expected " + with_commas(values.size()) +
-                   " values, found fewer; did the file change while it was read?");
-  }
-}
-
 // The mean of two stored values, or the usable one of them.
 double merged(double first, double second) {
   const auto usable = [](double v) { return std::isfinite(v) && v >= 0; };
@@ -133,20 +127,67 @@ double merged(double first, double second) {
   return usable(second) ? second : first;
 }
 
-// [..][360] -> [..][180]: phi_d and phi_d + 180 deg are the same bin by reciprocity.
-std::vector<double> fold_phi(const std::vector<double>& stored) {
-  std::vector<double> folded(stored.size() / 2);
-  for (std::size_t i = 0; i < folded.size(); ++i) {
-    const std::size_t row = i / Measurement::phi_d_bins, p = i % Measurement::phi_d_bins;
-    const double* values = stored.data() + row * double_phi_bins;
-    folded[i] = merged(values[p], values[p + Measurement::phi_d_bins]);
+// Reads the rows of one theta_h after another from the three planes of a file.
+class RowReader {
+ public:
+  RowReader(const std::filesystem::path& path, std::FILE* file, int phi_bins)
+      : path_(path), file_(file), row_size_(Measurement::theta_d_bins * phi_bins) {
+    // Rows are read whole: a buffer between would only copy them.
+    std::setvbuf(file, nullptr, _IONBF, 0);
   }
-  return folded;
-}
+
+  // Threads take turns at the file and convert what they read at the same time.
+  void operator()(int h, const Measurement::Rows& rows) {
+    if (row_size_ == Measurement::row_size) {
+      read(h, rows);
+      for (std::size_t c = 0; c < 3; ++c) {
+        for (int i = 0; i < row_size_; ++i) rows[c][i] *= channel_scale[c];
+      }
+      return;
+    }
+    std::vector<double> stored(3 * static_cast<std::size_t>(row_size_));
+    read(h, {stored.data(), stored.data() + row_size_, stored.data() + 2 * row_size_});
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double* const from = stored.data() + c * static_cast<std::size_t>(row_size_);
+      for (int i = 0; i < Measurement::row_size; ++i) {
+        rows[c][i] = channel_scale[c] * folded(from, i);
+      }
+    }
+  }
+
+ private:
+  void read(int h, const Measurement::Rows& rows) {
+    const std::lock_guard lock(turn_);
+    for (int c = 0; c < 3; ++c) {
+      const std::int64_t before =
+          std::int64_t{row_size_} * (h + c * std::int64_t{Measurement::theta_h_bins});
+      const auto offset = static_cast<std::int64_t>(sizeof(Dimensions) + sizeof(double) * before);
+      const auto count = static_cast<std::size_t>(row_size_);
+      if (std::fseek(file_, static_cast<long>(offset), SEEK_SET) != 0 ||
+          std::fread(rows[static_cast<std::size_t>(c)], sizeof(double), count, file_) != count) {
+        fail(path_,
+             "expected a whole table, found its end earlier; did the file change while it "
+             "was read?");
+      }
+    }
+  }
+
+  // [360] -> [180]: phi_d and phi_d + 180 deg are the same bin by reciprocity.
+  static double folded(const double* stored, int i) {
+    const int row = i / Measurement::phi_d_bins, p = i % Measurement::phi_d_bins;
+    const double* const values = stored + row * double_phi_bins;
+    return merged(values[p], values[p + Measurement::phi_d_bins]);
+  }
+
+  const std::filesystem::path& path_;
+  std::FILE* const file_;
+  const int row_size_;
+  std::mutex turn_;
+};
 
 }  // namespace
 
-Measurement read_merl(const std::filesystem::path& path) {
+Measurement read_merl(const std::filesystem::path& path, int threads) {
   const File file = open_for_reading(path);
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
@@ -154,15 +195,9 @@ Measurement read_merl(const std::filesystem::path& path) {
   const Dimensions found = read_dimensions(path, file.get(), size);
   check_dimensions(path, found);
   check_size(path, bytes_of(found), size);
-  std::vector<double> values((size - sizeof(Dimensions)) / sizeof(double));
-  read_values(path, file.get(), values);
-  if (found[2] == double_phi_bins) values = fold_phi(values);
-  for (int channel = 0; channel < 3; ++channel) {
-    double* const plane = values.data() + channel * Measurement::bin_count;
-    std::transform(plane, plane + Measurement::bin_count, plane,
-                   [=](double stored) { return stored * channel_scale[channel]; });
-  }
-  Measurement measurement(std::move(values));
+  RowReader reader(path, file.get(), found[2]);
+  const Measurement::FillRows fill = [&](int h, const Measurement::Rows& rows) { reader(h, rows); };
+  Measurement measurement(fill, threads);
   if (measurement.bins().valid == 0) {
     const BinCounts& bins = measurement.bins();
     fail(path, "expected reflectances, found no valid bin (" + with_commas(bins.negative) +
@@ -182,7 +217,7 @@ void write_merl(const Measurement& measurement, const std::filesystem::path& pat
   };
   File file(std::fopen(aside.c_str(), "wb"));
   if (!file) give_up(reason());
-  std::vector<double> stored = measurement.planes();
+  std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());
   for (int channel = 0; channel < 3; ++channel) {
     double* const plane = stored.data() + channel * Measurement::bin_count;
     std::transform(plane, plane + Measurement::bin_count, plane, [=](double value) {

@@ -8,7 +8,7 @@
 
 namespace lobefit {
 
-Measurement read_measurement(const std::filesystem::path& path) {
+Measurement read_measurement(const std::filesystem::path& path, int threads) {
   std::string suffix = path.extension().string();
   std::transform(suffix.begin(), suffix.end(), suffix.begin(),
                  [](unsigned char c) { return c < 128 ? static_cast<char>(std::tolower(c)) : c; });
@@ -17,7 +17,7 @@ Measurement read_measurement(const std::filesystem::path& path) {
     throw InputError(path.string() + ": expected a MERL table named *.binary, found " +
                      (suffix.empty() ? "no suffix." : "the suffix '" + suffix + "'."));
   }
-  return read_merl(path);
+  return read_merl(path, threads);
 }
 
 }  // namespace lobefit

@@ -315,7 +315,7 @@ SharedMeasurement from_values(const DirectionArray& values) {
     throw InputError("values: expected an array of shape (3, 90, 90, 180).");
   }
   return std::make_shared<Measurement>(
-      std::vector<double>(values.data(), values.data() + values.size()));
+      std::span<const double>(values.data(), static_cast<std::size_t>(values.size())));
 }
 
 // Everything about the job that its thread needs to be told.

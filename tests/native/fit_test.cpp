@@ -68,7 +68,8 @@ TEST(Fit, FindsAKnownInterpolatedLobe) {
 
 TEST(Fit, IsAsGoodAsTheTruthUnderNoiseSpikesAndLostBins) {
   const Parameters known = truth(ModelKind::interpolated, 50, 0.3, 1.5);
-  std::vector<double> planes = table_of(known).planes();
+  const Measurement table = table_of(known);
+  std::vector<double> planes(table.planes().begin(), table.planes().end());
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.05);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -221,14 +222,15 @@ TEST(Fit, OfExtremeTablesIsFinite) {
   const auto plane_of = [](auto value) {
     std::vector<double> planes(3 * static_cast<std::size_t>(Measurement::bin_count));
     for (std::size_t i = 0; i < planes.size(); ++i) planes[i] = value(i);
-    return Measurement(std::move(planes));
+    return Measurement(planes);
   };
   EXPECT_TRUE(finite(fit_of(plane_of([](std::size_t) { return 0.0; }), {})));
   EXPECT_TRUE(finite(fit_of(plane_of([](std::size_t i) { return i % 100000 ? 0.0 : 5.0; }), {})));
   EXPECT_TRUE(finite(fit_of(plane_of([](std::size_t i) { return i % 9999 ? -1.0 : 5.0; }), {})));
-  std::vector<double> tiny = sample_measurement("nickel").planes();
+  const Measurement nickel = sample_measurement("nickel");
+  std::vector<double> tiny(nickel.planes().begin(), nickel.planes().end());
   for (double& value : tiny) value *= 1e-30;
-  const Fit fit = fit_of(Measurement(std::move(tiny)), {});
+  const Fit fit = fit_of(Measurement(tiny), {});
   EXPECT_TRUE(finite(fit));
   EXPECT_LT(fit.errors.relative_l1.pooled, 0.5);
 }

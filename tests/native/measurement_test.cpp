@@ -33,7 +33,7 @@ TEST(Measurement, IsContinuousWhereTheAzimuthWrapsAround) {
 TEST(Measurement, IsUnknownBelowTheHorizonAndAmongInvalidBins) {
   const Measurement sample = sample_measurement("nickel");
   EXPECT_TRUE(std::isnan(sample.evaluate({0, 0, 1}, {1, 0, -1e-9})[0]));
-  std::vector<double> planes = sample.planes();
+  std::vector<double> planes(sample.planes().begin(), sample.planes().end());
   for (int d = 9; d < 12; ++d) {
     for (int h = 9; h < 12; ++h) {
       for (int p = 0; p < Measurement::phi_d_bins; ++p) {

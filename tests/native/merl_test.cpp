@@ -115,7 +115,7 @@ TEST_F(Merl, AveragesTheHalvesOf360Steps) {
 
 TEST_F(Merl, CountsInvalidBinsByKind) {
   Measurement sample = sample_measurement("nickel");
-  std::vector<double> planes = sample.planes();
+  std::vector<double> planes(sample.planes().begin(), sample.planes().end());
   planes[static_cast<std::size_t>(Measurement::index(0, 0, 0))] = -0.1;
   planes[static_cast<std::size_t>(Measurement::index(0, 0, 1))] =
       std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-#include "fitting/parallel.h"
+#include "measurement/parallel.h"
 
 #include <algorithm>
 #include <atomic>
