@@ -78,7 +78,7 @@ inline double dielectric_fresnel(double cosine, double ior) {
 }
 template <typename Dual>
 Dual dielectric_fresnel(double cosine, const Dual& ior) {
-  const auto [value, derivative] = fresnel_reflectance(cosine, ior.a);
+  const auto [value, derivative, unused] = fresnel_reflectance(cosine, ior.a);
   return Dual(value, derivative * ior.v);
 }
 

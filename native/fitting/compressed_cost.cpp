@@ -58,6 +58,7 @@ bool CompressedCost::compress(const double* free_values, Curvature curvature) co
   MatrixXd scaled = scale.cwiseInverse().asDiagonal() * hessian * scale.cwiseInverse().asDiagonal();
   scaled.diagonal().array() += 1e-12;
   const Eigen::LLT<MatrixXd, Eigen::Upper> factor(scaled);
+  if (factor.info() != Eigen::Success && curvature == Curvature::newton) return false;
   const MatrixXd root = factor.matrixU();
   const VectorXd projected =
       root.transpose().triangularView<Eigen::Lower>().solve(gradient.cwiseQuotient(scale));

@@ -20,8 +20,9 @@ namespace lobefit {
 // block a bin takes 75 times as long. The Jacobian is not the derivative of the residuals one by
 // one; only J'r and J'J mean something.
 //
-// H is Newton's wherever a sum of squares can have it, which is close to the minimum; elsewhere it
-// is that of reweighted squares, for which F >= |R^-T g|^2 always.
+// H is Newton's wherever a sum of squares can have it, which is close to the minimum: where it is
+// positive definite and F >= |R^-T g|^2. Elsewhere it is that of reweighted squares, for which both
+// hold always.
 //
 // A step that leaves the bounds is cut where it first meets one; the solver is then to be stopped
 // (left_bounds) and started again without the variable that met its bound. Ceres' own bounds are
@@ -43,7 +44,7 @@ class CompressedCost final : public ceres::CostFunction {
   bool left_bounds(const double* free_values) const;
 
  private:
-  // False where the curvature is Newton's and too small for a sum of squares: F < |R^-T g|^2.
+  // False where the curvature is Newton's and no sum of squares can have it.
   bool compress(const double* free_values, Curvature curvature) const;
 
   const Objective& objective_;

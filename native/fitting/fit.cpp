@@ -18,8 +18,9 @@ namespace {
 
 using Eigen::VectorXd;
 
-// Samples of the scan, of the polish of its candidates, and of that of the best of these.
-constexpr std::size_t scan_samples = 1000, candidate_samples = 3000, finalist_samples = 20000;
+// Samples that the best starts are polished on, one in how many of these that all starts are tried
+// on, and one in how many of the latter that are scanned for starts.
+constexpr std::size_t finalist_samples = 20000, finalists_to_candidates = 7, candidates_to_scan = 3;
 constexpr std::size_t max_candidates = 6, max_finalists = 2;
 // Starts that end this close to the best one, relatively, have found the same optimum.
 constexpr double agreement = 0.005;
@@ -46,12 +47,14 @@ class Fitter {
         monitor_(monitor),
         threads_(thread_count(options.threads)),
         variables_(options.kind, options.fresnel, options.separate_channels),
-        all_(all_samples(measurement, options)) {}
+        all_(all_samples(measurement, options)),
+        some_(subsample(all_, finalist_samples, threads_)),
+        few_(every_nth(some_, finalists_to_candidates)) {}
 
   Fit run() {
     const Stopwatch start_watch;
     monitor_.report(scan_stage, 0.1);
-    std::vector<Candidate> starts = scan_shapes(subsample(all_, scan_samples), variables_,
+    std::vector<Candidate> starts = scan_shapes(every_nth(few_, candidates_to_scan), variables_,
                                                 options_.norm, max_candidates, threads_, monitor_);
     fit_.start_seconds = start_watch.seconds();
     const Stopwatch fit_watch;
@@ -74,7 +77,7 @@ class Fitter {
     double progress = 0.2;
     for (const auto& [name, free] : stages) {
       monitor_.report("Fitting by the paper's stages", progress);
-      x = run_stage(name, free, x, fine_precision());
+      x = run_stage(name, free, x, fine_precision()).x;
       progress += 0.25;
     }
     return x;
@@ -83,26 +86,19 @@ class Fitter {
   VectorXd run_polish(std::vector<Candidate> candidates) {
     const Stopwatch watch;
     monitor_.report("Trying the starts", 0.3);
-    const Samples few = subsample(all_, candidate_samples);
-    std::vector<Minimum> minima = for_each_start(starts_of(candidates), [&](const VectorXd& start) {
-      return stages_and_polish(few, start);
-    });
+    std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision());
     judge_certainty(minima);
     monitor_.report("Trying the best of them", 0.5);
-    const Samples some = subsample(all_, finalist_samples);
     minima.resize(std::min(minima.size(), max_finalists));
-    const std::vector<Minimum> finalists =
-        for_each_start(starts_of(minima), [&](const VectorXd& start) {
-          return minimise(some, variables_, options_.norm, held_back(start, variables_.all()),
-                          start, finishing_precision(), 1, monitor_);
-        });
-    monitor_.report("Polishing on all bins", 0.6);
-    const VectorXd& best = finalists.front().x;
+    const std::vector<Minimum> finalists = polish(some_, starts_of(minima), finishing_precision());
     fit_.stages.push_back({"polish of " + std::to_string(candidates.size()) +
                                " starts on a subsample, then of the best on a larger one",
-                           mean_error(best), watch.seconds(),
-                           iterations_of(minima) + iterations_of(finalists)});
-    return run_stage("polish on all bins", variables_.all(), best, last_precision());
+                           0, watch.seconds(), iterations_of(minima) + iterations_of(finalists)});
+    monitor_.report("Polishing on all bins", 0.6);
+    const Minimum last =
+        run_stage("polish on all bins", variables_.all(), finalists.front().x, last_precision());
+    fit_.stages.front().error = mean_error(last.start_value);
+    return last.x;
   }
 
   template <typename Start>
@@ -112,13 +108,29 @@ class Fitter {
     return points;
   }
 
-  // The minima from all starts, best first.
-  template <typename Work>
-  std::vector<Minimum> for_each_start(const std::vector<VectorXd>& starts, const Work& work) const {
+  static int iterations_of(const std::vector<Minimum>& minima) {
+    return std::accumulate(minima.begin(), minima.end(), 0,
+                           [](int sum, const Minimum& m) { return sum + m.iterations; });
+  }
+
+  // All variables, but for a start whose alpha is 0 or 1: it stays there until the polish on all
+  // bins, so that the result is no worse than the pure Phong or Blinn-Phong lobe. For s near 0 the
+  // objective jumps where bins leave the lobe, and a subsample sees too few of those.
+  std::vector<int> movable(const VectorXd& start) const {
+    std::vector<int> free = variables_.all();
+    const int alpha = variables_.interpolation();
+    if (alpha >= 0 && is_pure(start[alpha])) std::erase(free, alpha);
+    return free;
+  }
+
+  // The minima on a subsample from all starts, best first.
+  std::vector<Minimum> polish(const Samples& samples, const std::vector<VectorXd>& starts,
+                              const Precision& precision) const {
     std::vector<Minimum> minima(starts.size());
     parallel_for(static_cast<int>(starts.size()), threads_, [&](int i) {
       const auto at = static_cast<std::size_t>(i);
-      minima[at] = work(starts[at]);
+      minima[at] = minimise(samples, variables_, options_.norm, movable(starts[at]), starts[at],
+                            precision, 1, monitor_);
     });
     std::stable_sort(minima.begin(), minima.end(), [](const Minimum& left, const Minimum& right) {
       return left.true_value < right.true_value;
@@ -126,49 +138,24 @@ class Fitter {
     return minima;
   }
 
-  static int iterations_of(const std::vector<Minimum>& minima) {
-    return std::accumulate(minima.begin(), minima.end(), 0,
-                           [](int sum, const Minimum& m) { return sum + m.iterations; });
-  }
-
-  // A start with alpha at 0 or 1 keeps it there until the polish on all bins, so that the result is
-  // no worse than the pure Phong or Blinn-Phong lobe: for s near 0 the objective jumps where bins
-  // leave the lobe, and a subsample sees too few of those.
-  std::vector<int> held_back(const VectorXd& start, std::vector<int> free) const {
-    const int alpha = variables_.interpolation();
-    if (alpha >= 0 && is_pure(start[alpha])) std::erase(free, alpha);
-    return free;
-  }
-
-  Minimum stages_and_polish(const Samples& samples, const VectorXd& start) const {
-    Minimum minimum{start, 0, 0, false};
-    for (const std::vector<int>& free :
-         {variables_.shape(), variables_.shape_and_specular(), variables_.all()}) {
-      const int before = minimum.iterations;
-      minimum = minimise(samples, variables_, options_.norm, held_back(start, free), minimum.x,
-                         coarse_precision(), 1, monitor_);
-      minimum.iterations += before;
-    }
+  Minimum run_stage(const std::string& name, const std::vector<int>& free, const VectorXd& x,
+                    const Precision& precision) {
+    const Stopwatch watch;
+    Minimum minimum =
+        minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_);
+    fit_.converged = minimum.converged;
+    fit_.stages.push_back(
+        {name, mean_error(minimum.true_value), watch.seconds(), minimum.iterations});
     return minimum;
   }
 
-  VectorXd run_stage(const std::string& name, const std::vector<int>& free, const VectorXd& x,
-                     const Precision& precision) {
-    const Stopwatch watch;
-    const Minimum minimum =
-        minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_);
-    fit_.converged = minimum.converged;
-    fit_.stages.push_back({name, mean_error(minimum.x), watch.seconds(), minimum.iterations});
-    return minimum.x;
-  }
-
-  double mean_error(const VectorXd& x) const {
-    const Objective objective(all_, variables_, options_.norm, 1, threads_);
+  // The mean over all bins that a true value stands for.
+  double mean_error(double true_value) const {
     const double weight = std::accumulate(all_.weight.begin(), all_.weight.end(), 0.0);
     constexpr double values_of_a_sample = 6;  // three channels, two halves
     const bool linear = options_.norm == Norm::l1 || options_.norm == Norm::cosine_l1;
     const double unit = linear ? all_.unit : options_.norm == Norm::l2 ? all_.unit * all_.unit : 1;
-    return objective.evaluate(x).true_value * unit / (values_of_a_sample * weight);
+    return true_value * unit / (values_of_a_sample * weight);
   }
 
   // A start that held alpha cannot agree unless the optimum is a pure lobe; it counts only then.
@@ -219,7 +206,7 @@ class Fitter {
   Monitor& monitor_;
   const int threads_;
   const Variables variables_;
-  const Samples all_;
+  const Samples all_, some_, few_;
   Fit fit_;
 };
 

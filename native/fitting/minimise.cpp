@@ -92,20 +92,24 @@ bool has_smoothing(Norm norm) { return norm == Norm::l1 || norm == Norm::cosine_
 
 }  // namespace
 
-Precision coarse_precision() { return {{0.3, 0.1, 0.03}, 1e-5, 60}; }
+Precision coarse_precision() { return {{0.1, 0.03}, 1e-4, 60}; }
 Precision fine_precision() { return {{0.1, 0.03, 0.01}, 1e-7, 100}; }
 Precision finishing_precision() { return {{0.03, 0.01}, 1e-6, 100}; }
-Precision last_precision() { return {{0.01}, 1e-6, 30}; }
+Precision last_precision() { return {{0.01}, 2e-6, 30}; }
 
 Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const VectorXd& x, const Precision& precision,
                  int threads, const Monitor& monitor) {
-  Minimum best{variables.clamp(x), std::numeric_limits<double>::infinity(), 0, false};
+  constexpr double unknown = std::numeric_limits<double>::infinity();
+  Minimum best{variables.clamp(x), unknown, unknown, 0, false};
   Minimum current = best;
   const std::size_t levels = has_smoothing(norm) ? precision.smoothing.size() : 1;
   for (std::size_t level = 0; level < levels; ++level) {
     const Objective objective(samples, variables, norm, precision.smoothing[level], threads);
     current.converged = false;
+    if (level == 0) {
+      current.start_value = objective.evaluate(current.x, Curvature::newton).true_value;
+    }
     solve_level(objective, free, precision, monitor, current);
     current.true_value = objective.evaluate(current.x, Curvature::newton).true_value;
     const double gain = best.true_value - current.true_value;

@@ -13,7 +13,8 @@ namespace lobefit {
 
 struct Minimum {
   Eigen::VectorXd x;
-  double true_value = 0;  // Evaluation::true_value there
+  double true_value = 0;   // Evaluation::true_value there
+  double start_value = 0;  // and where it began
   int iterations = 0;
   bool converged = false;
 };

@@ -36,16 +36,16 @@ struct LobeVariables {
   int alpha, third, count;
 };
 
-// k_s and its logarithmic slope by log s for the models whose coefficient is rho_s.
+// k_s of a rho_s of 1, its logarithmic slope by log s, and the slope of that.
 struct SpecularScale {
-  double factor, log_slope;
+  double factor, log_slope, log_curvature;
 };
 
 SpecularScale scale_at(ModelKind kind, double s) {
   const double factor = specular_scale(kind, s);
-  if (kind == ModelKind::interpolated) return {factor, 0};
+  if (kind == ModelKind::interpolated) return {factor, 0, 0};
   const double shift = kind == ModelKind::modified_phong ? 2 : 8;
-  return {factor, s / (s + shift)};
+  return {factor, s / (s + shift), s * shift / ((s + shift) * (s + shift))};
 }
 
 class Assembly {
@@ -80,15 +80,20 @@ class Assembly {
     if (parameters_.ior) {
       const FresnelReflectance fresnel = fresnel_reflectance(run.cos_theta_d, *parameters_.ior);
       in.fresnel = fresnel.value;
-      in.fresnel_slope = fresnel.derivative * (*parameters_.ior - 1);
+      // The variable is log(eta - 1).
+      const double excess = *parameters_.ior - 1;
+      in.fresnel_slope = fresnel.derivative * excess;
+      in.fresnel_curvature = fresnel.second_derivative * excess * excess + in.fresnel_slope;
     }
     in.smoothing = smoothing;
     in.newton = curvature == Curvature::newton;
     return in;
   }
 
-  // Gradient and matrix by the lobe's variables, from the sums of one group over all runs.
-  void add(const KernelSums& sums, int group, VectorXd& gradient, MatrixXd& hessian) const {
+  // Gradient and matrix by the lobe's variables, from the sums of one group over all runs; `curved`
+  // adds what the curvature of the model does to the matrix.
+  void add(const KernelSums& sums, int group, bool curved, VectorXd& gradient,
+           MatrixXd& hessian) const {
     const int first = groups() == 1 ? 0 : group, channels = groups() == 1 ? 3 : 1;
     const int shape[3] = {6 + group, lobe_.alpha, lobe_.third};
     for (int c = 0; c < channels; ++c) {
@@ -101,13 +106,15 @@ class Assembly {
       hessian(k, k) += sums.wgg[c];
       for (int x = 0; x < 3; ++x) {
         hessian(shape[x], d) += specular * sums.wx[c][x];
-        hessian(shape[x], k) += specular * sums.wgx[c][x];
+        hessian(shape[x], k) += specular * sums.wgx[c][x] + (curved ? sums.rx[c][x] : 0);
+        gradient[shape[x]] += specular * sums.rx[c][x];
       }
     }
     int pair = 0;
     for (int x = 0; x < 3; ++x) {
-      gradient[shape[x]] += sums.rx[x];
-      for (int y = x; y < 3; ++y) hessian(shape[y], shape[x]) += sums.wxx[pair++];
+      for (int y = x; y < 3; ++y, ++pair) {
+        hessian(shape[y], shape[x]) += sums.wxx[pair] + (curved ? sums.rxx[pair] : 0);
+      }
     }
   }
 
@@ -125,6 +132,21 @@ class Assembly {
     if (variables_.interpolation() >= 0) chain(lobe_.alpha, variables_.interpolation()) = 1;
     if (variables_.log_excess_ior() >= 0) chain(lobe_.third, variables_.log_excess_ior()) = 1;
     return chain;
+  }
+
+  // What the curvature of k_s as a function of rho_s and log s adds to the matrix of the fit's
+  // variables, given the gradient by the lobe's.
+  void add_scale_curvature(const VectorXd& gradient, MatrixXd& hessian) const {
+    for (int c = 0; c < 3; ++c) {
+      const int rho = Variables::specular + c;
+      const int exponent = Variables::log_exponent + (groups() == 3 ? c : 0);
+      const SpecularScale scale = scale_at(variables_.kind(), std::exp(x_[exponent]));
+      const double both = gradient[3 + c] * scale.factor * scale.log_slope;
+      hessian(rho, exponent) += both;
+      hessian(exponent, rho) += both;
+      hessian(exponent, exponent) += gradient[3 + c] * parameters_.specular[c] *
+                                     (scale.log_slope * scale.log_slope + scale.log_curvature);
+    }
   }
 
   int lobe_count() const { return lobe_.count; }
@@ -169,18 +191,21 @@ Evaluation Objective::pass(const VectorXd& x, Curvature curvature) const {
   });
   VectorXd gradient = VectorXd::Zero(assembly.lobe_count());
   MatrixXd hessian = MatrixXd::Zero(assembly.lobe_count(), assembly.lobe_count());
+  // The misfit of logarithms curves in another way.
+  const bool curved = curvature == Curvature::newton && norm_ != Norm::log_l2;
   Evaluation result;
   for (int group = 0; group < groups; ++group) {
     KernelSums total{};
     for (int r = 0; r < runs; ++r) add(total, sums[static_cast<std::size_t>(r * groups + group)]);
     result.value += total.value;
     result.true_value += total.true_value;
-    assembly.add(total, group, gradient, hessian);
+    assembly.add(total, group, curved, gradient, hessian);
   }
   const MatrixXd full = hessian.selfadjointView<Eigen::Lower>();
   const MatrixXd chain = assembly.chain();
   result.gradient = chain.transpose() * gradient;
   result.hessian = chain.transpose() * full * chain;
+  if (curved) assembly.add_scale_curvature(gradient, result.hessian);
   return result;
 }
 

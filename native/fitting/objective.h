@@ -12,8 +12,9 @@ namespace lobefit {
 // F = sum over samples, channels and both halves of weight * rho(r), r = model - measured, with
 //   rho(r) = 2 e^2 (sqrt(1 + r^2/e^2) - 1)   of the norms l1 and cosine_l1: about 2 e |r|,
 //   rho(r) = r^2                             of l2 and log_l2.
-// Matrix of J'WJ with W = rho'(r) / (2 r), which never overshoots and converges slowly, or with
-// W = rho''(r) / 2, Newton's, which is fast close to the minimum. They are the same for squares.
+// Its matrix is J'WJ with W = rho'(r) / (2 r), that of reweighted squares, which never overshoots
+// and converges slowly; or half of F's second derivatives, Newton's, which is fast close to the
+// minimum and need not be positive definite farther off. For log_l2 both are Gauss and Newton's.
 enum class Curvature { reweighted, newton };
 
 struct Evaluation {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "measurement/parallel.h"
 #include "reflectance/model.h"
@@ -167,13 +168,15 @@ class Builder {
   std::vector<int> theta_d_;  // of each run
 };
 
-// How far a sample stands from the median of 1, all channels and both halves pooled.
-double importance(const Samples& samples, std::size_t i) {
-  double distance = 0;
-  for (const auto& channel : samples.measured) {
-    for (const auto& half : channel) distance += std::abs(static_cast<double>(half[i]) - 1);
+// How far samples stand from the median of 1, all channels and both halves pooled.
+void measure_importance(const Samples& samples, const Samples::Run& run, float* importance) {
+  for (std::size_t i = run.begin; i < run.end; ++i) {
+    float distance = 0;
+    for (const auto& channel : samples.measured) {
+      for (const auto& half : channel) distance += std::abs(half[i] - 1);
+    }
+    importance[i] = std::sqrt(distance * samples.weight[i]);
   }
-  return samples.weight[i] > 0 ? std::sqrt(distance) * std::sqrt(samples.weight[i]) : 0;
 }
 
 }  // namespace
@@ -182,10 +185,18 @@ Samples all_samples(const Measurement& measurement, const FitOptions& options) {
   return Builder(measurement, options).build();
 }
 
-Samples subsample(const Samples& all, std::size_t count) {
-  std::vector<double> chance(all.size());
-  double sum = 0;
-  for (std::size_t i = 0; i < all.size(); ++i) sum += chance[i] = importance(all, i);
+Samples subsample(const Samples& all, std::size_t count, int threads) {
+  std::vector<float> chance(all.size());
+  std::vector<double> sums(all.runs.size());
+  parallel_for(static_cast<int>(all.runs.size()), threads, [&](int r) {
+    const Samples::Run& run = all.runs[static_cast<std::size_t>(r)];
+    measure_importance(all, run, chance.data());
+    const auto from = chance.begin();
+    sums[static_cast<std::size_t>(r)] =
+        std::accumulate(from + static_cast<std::ptrdiff_t>(run.begin),
+                        from + static_cast<std::ptrdiff_t>(run.end), 0.0);
+  });
+  const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
   // A small even share keeps every weight bounded: a bin at the median must not be impossible.
   const double even = 0.1 * sum / static_cast<double>(std::max<std::size_t>(all.size(), 1));
   Samples drawn;
@@ -207,6 +218,22 @@ Samples subsample(const Samples& all, std::size_t count) {
     end_run(drawn);
   }
   return drawn;
+}
+
+Samples every_nth(const Samples& samples, std::size_t n) {
+  Samples thinned;
+  thinned.unit = samples.unit;
+  std::size_t seen = n / 2;
+  for (const Samples::Run& run : samples.runs) {
+    begin_run(thinned, run.cos_theta_d);
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      if (!(samples.weight[i] > 0) || ++seen % n != 0) continue;
+      append(thinned, samples, i);
+      thinned.weight.back() *= static_cast<float>(n);
+    }
+    end_run(thinned);
+  }
+  return thinned;
 }
 
 }  // namespace lobefit

@@ -43,6 +43,9 @@ Samples all_samples(const Measurement& measurement, const FitOptions& options);
 // About `count` of them, drawn with probability proportional to the square root of their distance
 // from the median (and so with weight 1/probability): systematic sampling, always the same draw.
 // Two per cent of a table so drawn have the optimum of the whole to about 1e-4.
-Samples subsample(const Samples& all, std::size_t count);
+Samples subsample(const Samples& all, std::size_t count, int threads = 1);
+
+// Each n-th of them, at n times its weight.
+Samples every_nth(const Samples& samples, std::size_t n);
 
 }  // namespace lobefit

@@ -11,17 +11,19 @@ namespace lobefit {
 FresnelReflectance fresnel_reflectance(double cosine, double ior) {
   const double c = std::clamp(cosine, 0.0, 1.0);
   const double excess = (ior - 1) * (ior + 1);
-  if (!(excess > 0)) return {0, 0};
+  if (!(excess > 0)) return {0, 0, 0};
   const double g = std::sqrt(excess + c * c);
   const double sum = g + c, difference = excess / sum;
-  const double s = difference / sum;
   const double upper = c * sum - 1, lower = c * difference + 1;
-  const double ratio = upper / lower;
-  const double p = s * ratio;
-  const double g_slope = ior / g;
-  const double s_slope = 2 * c / (sum * sum) * g_slope;
-  const double ratio_slope = c * (lower - upper) / (lower * lower) * g_slope;
-  return {(s * s + p * p) / 2, s * s_slope + p * (s_slope * ratio + s * ratio_slope)};
+  // Value and derivatives by g of r_s, of r_p / r_s and of r_p.
+  const double s = difference / sum, s_g = 2 * c / (sum * sum), s_gg = -2 * s_g / sum;
+  const double ratio = upper / lower, ratio_g = c * (lower - upper) / (lower * lower),
+               ratio_gg = -2 * c * ratio_g / lower;
+  const double p = s * ratio, p_g = s_g * ratio + s * ratio_g,
+               p_gg = s_gg * ratio + 2 * s_g * ratio_g + s * ratio_gg;
+  const double by_g = s * s_g + p * p_g, by_gg = s_g * s_g + s * s_gg + p_g * p_g + p * p_gg;
+  const double g_slope = ior / g, g_curvature = (c * c - 1) / (g * g * g);
+  return {(s * s + p * p) / 2, by_g * g_slope, by_gg * g_slope * g_slope + by_g * g_curvature};
 }
 
 }  // namespace lobefit

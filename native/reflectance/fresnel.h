@@ -3,10 +3,11 @@
 
 namespace lobefit {
 
-// A value and its derivative by the index of refraction.
+// A value and its derivatives by the index of refraction.
 struct FresnelReflectance {
   double value;
   double derivative;
+  double second_derivative;
 };
 
 // R_F for unpolarised light that arrives from outside at an angle of the given cosine (0..1) on a

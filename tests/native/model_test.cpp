@@ -116,7 +116,7 @@ TEST(Fresnel, IsThatOfTheTwoPolarisations) {
   EXPECT_EQ(fresnel_reflectance(0.5, 1).value, 0);
 }
 
-TEST(Fresnel, HasTheDerivativeOfItsDifferences) {
+TEST(Fresnel, HasTheDerivativesOfItsDifferences) {
   for (const double ior : {1.05, 1.5, 3.0, 50.0}) {
     for (const double c : {0.02, 0.3, 0.7, 1.0}) {
       const double step = 1e-5 * (ior - 1);
@@ -126,6 +126,11 @@ TEST(Fresnel, HasTheDerivativeOfItsDifferences) {
       // Central differences leave an error of the order of the squared relative step.
       EXPECT_NEAR(fresnel_reflectance(c, ior).derivative, difference,
                   1e-7 * std::abs(difference) + 1e-11);
+      const double slopes = (fresnel_reflectance(c, ior + step).derivative -
+                             fresnel_reflectance(c, ior - step).derivative) /
+                            (2 * step);
+      EXPECT_NEAR(fresnel_reflectance(c, ior).second_derivative, slopes,
+                  1e-7 * std::abs(slopes) + 1e-11);
     }
   }
 }
