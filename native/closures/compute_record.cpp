@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
 #include "reflectance/albedo.h"
 
@@ -21,18 +22,24 @@ std::shared_ptr<const Measurement> open(const MeasurementSource& source, int thr
   return std::get<std::shared_ptr<const Measurement>>(source);
 }
 
-AlbedoByViewAngle albedo_by_view_angle(const Measurement& measurement,
-                                       const Parameters& parameters) {
+AlbedoByViewAngle albedo_by_view_angle(const Measurement& measurement, const Parameters& parameters,
+                                       int threads) {
+  const Reflectance measured = [&](const Vector3& wi, const Vector3& wo) {
+    return measurement.evaluate(wi, wo);
+  };
+  const Reflectance model = [&](const Vector3& wi, const Vector3& wo) {
+    return evaluate_model(parameters, wi, wo);
+  };
   AlbedoByViewAngle albedo;
-  for (const double angle : {0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0}) {
-    albedo.view_angle.push_back(angle);
-    albedo.measured.push_back(directional_albedo(
-        [&](const Vector3& wi, const Vector3& wo) { return measurement.evaluate(wi, wo); },
-        radians(angle)));
-    albedo.model.push_back(directional_albedo(
-        [&](const Vector3& wi, const Vector3& wo) { return evaluate_model(parameters, wi, wo); },
-        radians(angle)));
-  }
+  albedo.view_angle = {0, 15, 30, 45, 60, 75, 85};
+  const auto count = albedo.view_angle.size();
+  albedo.measured.resize(count);
+  albedo.model.resize(count);
+  parallel_for(static_cast<int>(2 * count), thread_count(threads), [&](int i) {
+    const auto at = static_cast<std::size_t>(i) / 2;
+    (i % 2 == 0 ? albedo.measured : albedo.model)[at] =
+        directional_albedo(i % 2 == 0 ? measured : model, radians(albedo.view_angle[at]));
+  });
   return albedo;
 }
 
@@ -49,7 +56,7 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   contents.read_seconds = seconds_since(start);
   contents.fit = fit_model(*measurement, options, monitor);
   monitor.report("Measuring the albedo", 0.97);
-  contents.albedo = albedo_by_view_angle(*measurement, contents.fit.parameters);
+  contents.albedo = albedo_by_view_angle(*measurement, contents.fit.parameters, options.threads);
   monitor.throw_if_cancelled();
   monitor.report("Finding the Principled BSDF", 0.98);
   const Target target = sample_target(

@@ -67,11 +67,17 @@ struct View {
   double n_wo;
   std::vector<Sample> samples;
 };
-using Views = std::vector<View>;
+
+// Views, and how many threads share a sum over them.
+struct Views {
+  std::vector<View> all;
+  int threads = 1;
+};
 
 // One of `every_view` views, and of its lights one of `every_light`.
-Views thin_out(const Target& target, std::size_t every_view, std::size_t every_light) {
-  Views views;
+Views thin_out(const Target& target, std::size_t every_view, std::size_t every_light,
+               int threads = 1) {
+  Views views{{}, threads};
   const std::size_t first_view = std::min(every_view, target.size()) / 2;
   for (std::size_t v = first_view; v < target.size(); v += every_view) {
     const TargetView& from = target[v];
@@ -81,18 +87,31 @@ Views thin_out(const Target& target, std::size_t every_view, std::size_t every_l
       view.samples.push_back(
           {facet_geometry(light.wi, from.wo), light.reflected, light.weight, light.typical});
     }
-    views.push_back(std::move(view));
+    views.all.push_back(std::move(view));
   }
   return views;
 }
 
-// The sum of an amount over all samples, given what the sockets reflect there.
+// The sum of what each view adds, in the order of the views whatever the number of threads.
+template <typename Sum, typename OfView>
+Sum sum_over_views(const Views& views, Sum sum, OfView&& of_view) {
+  std::vector<Sum> parts(views.all.size(), sum);
+  parallel_for(static_cast<int>(parts.size()), views.threads, [&](int v) {
+    const auto at = static_cast<std::size_t>(v);
+    parts[at] = of_view(views.all[at]);
+  });
+  for (const Sum& part : parts) sum += part;
+  return sum;
+}
+
+// The sum of an amount over all samples, given what the sockets reflect there; threads may ask for
+// amounts at the same time.
 template <typename Amount>
 double sum_over(const Views& views, const Vector& x, Amount&& amount) {
   const SharedSockets<double> shared = {x[metallic], std::exp(x[log_roughness]), x[root],
                                         x.segment<3>(tint).maxCoeff()};
-  double sum = 0;
-  for (const View& view : views) {
+  return sum_over_views(views, 0.0, [&](const View& view) {
+    double sum = 0;
     const auto at_view = principled_at_view(shared, view.n_wo);
     for (const Sample& sample : view.samples) {
       const auto light = principled_at_light(shared, at_view, sample.at);
@@ -102,8 +121,8 @@ double sum_over(const Views& views, const Vector& x, Amount&& amount) {
       }
       sum += amount(sample, reflected);
     }
-  }
-  return sum;
+    return sum;
+  });
 }
 
 // The distance to the target by error_of, up to a factor where views or lights are left out.
@@ -123,7 +142,26 @@ double smooth_error(const Views& views, const Vector& x, double smoothing) {
   });
 }
 
-// Gradient of smooth_error and the matrix of its iteratively reweighted least squares.
+// Of each channel, by its own unknowns: the gradient of smooth_error and the matrix of its
+// iteratively reweighted least squares.
+struct ChannelEquations {
+  std::array<Eigen::Matrix<double, own_unknowns, own_unknowns>, 3> matrices;
+  std::array<Eigen::Matrix<double, own_unknowns, 1>, 3> gradients;
+
+  ChannelEquations() {
+    for (auto& matrix : matrices) matrix.setZero();
+    for (auto& gradient : gradients) gradient.setZero();
+  }
+  ChannelEquations& operator+=(const ChannelEquations& other) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      matrices[c] += other.matrices[c];
+      gradients[c] += other.gradients[c];
+    }
+    return *this;
+  }
+};
+
+// The same by all unknowns.
 struct NormalEquations {
   Matrix matrix = Matrix::Zero();
   Vector gradient = Vector::Zero();
@@ -134,38 +172,33 @@ NormalEquations linearise(const Views& views, const Vector& x, double smoothing)
   const int brightest = brightest_tint(x);
   const SharedSockets<Dual> shared = {Dual(x[metallic], 0), exp(Dual(x[log_roughness], 1)),
                                       Dual(x[root], 2), Dual(x[tint + brightest], 3)};
-  std::array<Dual, 3> bases, tints;
-  std::array<Eigen::Matrix<double, own_unknowns, own_unknowns>, 3> matrices;
-  std::array<Eigen::Matrix<double, own_unknowns, 1>, 3> gradients;
-  for (int c = 0; c < 3; ++c) {
-    const auto channel = static_cast<std::size_t>(c);
-    bases[channel] = Dual(x[base + c], 4);
-    tints[channel] = Dual(x[tint + c], 5);
-    matrices[channel].setZero();
-    gradients[channel].setZero();
-  }
-  for (const View& view : views) {
+  const auto of_view = [&](const View& view) {
+    ChannelEquations sums;
     const auto at_view = principled_at_view(shared, view.n_wo);
     for (const Sample& sample : view.samples) {
       const auto light = principled_at_light(shared, at_view, sample.at);
       const double e = smoothing * sample.typical;
       for (std::size_t c = 0; c < 3; ++c) {
-        const Dual value = principled_channel(light, bases[c], tints[c]);
-        const double r = value.a - sample.target[static_cast<Eigen::Index>(c)];
+        const auto channel = static_cast<Eigen::Index>(c);
+        const Dual value =
+            principled_channel(light, Dual(x[base + channel], 4), Dual(x[tint + channel], 5));
+        const double r = value.a - sample.target[channel];
         const double weight = sample.weight / std::sqrt(r * r + e * e);
-        matrices[c].noalias() += (weight * value.v) * value.v.transpose();
-        gradients[c] += (weight * r) * value.v;
+        sums.matrices[c].noalias() += (weight * value.v) * value.v.transpose();
+        sums.gradients[c] += (weight * r) * value.v;
       }
     }
-  }
+    return sums;
+  };
+  const ChannelEquations sums = sum_over_views(views, ChannelEquations(), of_view);
   NormalEquations equations;
   for (std::size_t c = 0; c < 3; ++c) {
     const OwnUnknowns own = own_unknowns_of(static_cast<int>(c), brightest);
     for (int j = 0; j < own_unknowns; ++j) {
       const int column = own[static_cast<std::size_t>(j)];
-      equations.gradient[column] += gradients[c][j];
+      equations.gradient[column] += sums.gradients[c][j];
       for (int i = 0; i < own_unknowns; ++i) {
-        equations.matrix(own[static_cast<std::size_t>(i)], column) += matrices[c](i, j);
+        equations.matrix(own[static_cast<std::size_t>(i)], column) += sums.matrices[c](i, j);
       }
     }
   }
@@ -218,7 +251,7 @@ Rgb diffuse_albedo(const Views& views) {
   Rgb albedo;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> values;
-    for (const View& view : views) {
+    for (const View& view : views.all) {
       for (const Sample& sample : view.samples) {
         if (sample.at.cos2_h < 0.6) values.push_back(pi * sample.target[c] / sample.at.n_wi);
       }
@@ -270,7 +303,7 @@ struct Candidate {
 Principled fit_principled(const Target& target, int threads) {
   if (target.empty()) return {};
   const Views few = thin_out(target, 4, 3), some = thin_out(target, 4, 1),
-              all = thin_out(target, 1, 1);
+              all = thin_out(target, 1, 1, thread_count(threads));
   std::vector<Candidate> found;
   for (const Vector& start : starts(few)) found.push_back({start, 0});
   // Follows every candidate and keeps the best few.

@@ -5,7 +5,7 @@
 namespace lobefit {
 
 Rgb directional_albedo(const Reflectance& reflectance, double view_angle) {
-  constexpr int rings = 180, sectors = 60;
+  constexpr int rings = 180, sectors = 30;
   const Vector3 wo(std::sin(view_angle), 0, std::cos(view_angle));
   Rgb albedo = Rgb::Zero();
   for (int ring = 0; ring < rings; ++ring) {
