@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 // Samples that the best starts are polished on, one in how many of these that all starts are tried
 // on, and one in how many of the latter that are scanned for starts.
-constexpr std::size_t finalist_samples = 20000, finalists_to_candidates = 7, candidates_to_scan = 3;
+constexpr std::size_t finalist_samples = 16000, finalists_to_candidates = 8, candidates_to_scan = 4;
 constexpr std::size_t max_candidates = 6, max_finalists = 2;
 // Starts that end this close to the best one, relatively, have found the same optimum.
 constexpr double agreement = 0.005;

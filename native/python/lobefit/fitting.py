@@ -1,5 +1,6 @@
 """Fits in the background: a job to ask for its progress, and calls that wait for one."""
 
+import contextlib
 import dataclasses
 import os
 import time
@@ -107,6 +108,7 @@ class Job:
         else:
             self._source = source if isinstance(source, Measurement) else os.fspath(source)
             self._models = list(MODELS) if model == "all" else [model]
+        self._origin: Origin | None = None
         self._cancelled = False
         self._running: _native.FitJob | _native.ClosureJob | None = None
         self._begin_next()
@@ -138,6 +140,9 @@ class Job:
         """Waits at most `seconds` for the end; says whether it is reached."""
         if self._running is None:
             return True
+        # A file that cannot be read is the reader's to tell of, in the threads.
+        with contextlib.suppress(InputError):
+            self._hash_source()
         if not self._running.wait(seconds):
             return False
         if self._cancelled or self._failed():
@@ -165,8 +170,14 @@ class Job:
 
     def _base_record(self) -> Record:
         if self._record is None:
-            self._record = _record(self._fitted, self._origin())
+            self._hash_source()
+            self._record = _record(self._fitted, self._origin or Origin())
         return self._record
+
+    def _hash_source(self) -> None:
+        """Learns where the measurement comes from, while the threads are busy with it."""
+        if self._origin is None and isinstance(self._source, str) and self._models:
+            self._origin = origin_of(self._source)
 
     def _begin_next(self) -> None:
         self._running = None
@@ -216,9 +227,6 @@ class Job:
                 )
             self._measurement = read(path)
         return self._measurement
-
-    def _origin(self) -> Origin:
-        return origin_of(self._source) if isinstance(self._source, str) else Origin()
 
 
 def start_fit(source: Source | Record, **options: Any) -> Job:
