@@ -4,7 +4,9 @@ FILE is a measured file or a record; closures that a record lacks are fitted fir
 under a sky with small bright suns, sampled as any HDR image is. Two figures, and their ratios to
 those of the material's own best Principled BSDF (at most 1.2 is wanted): the variance of pixels at
 equal samples, as a part of the squared mean of the picture, and the root mean square error of a
-denoised picture of 64 samples against one of 4096, as a part of the mean.
+denoised picture of 64 samples against one of 4096, as a part of the mean. Few samples that meet a
+sun make most of the variance, so that it takes hundreds of pictures to know it: its standard error
+goes beside.
 """
 
 import argparse
@@ -23,7 +25,8 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 SIZE = 48
-NOISY, RENDERS = 16, 24  # samples of a picture whose variance is taken, and how many of them
+NOISY, RENDERS = 16, 240  # samples of a picture whose variance is taken, and how many of them
+PARTS = 12  # of the renders, whose variances tell how sure that of all is
 DENOISED, REFERENCE = 64, 4096
 LIMIT = 1.2
 # Direction, cosine of the half angle, radiance: two suns of some 3 and 5 degrees, and a window.
@@ -88,16 +91,18 @@ def picture(
     return radiance(scene)
 
 
-def noise_of(scene: bpy.types.Scene) -> tuple[float, float]:
-    """The relative variance of pixels, and the relative error of the denoised picture."""
+def noise_of(scene: bpy.types.Scene) -> tuple[float, float, float]:
+    """The relative variance of pixels, its standard error, and the denoised picture's error."""
     several = np.stack([picture(scene, NOISY, seed) for seed in range(RENDERS)])
-    variance = several.var(axis=0, ddof=1).mean() / several.mean() ** 2
+    parts = [part.var(axis=0, ddof=1).mean() for part in np.split(several, PARTS)]
+    variance, scale = np.mean(parts), several.mean() ** 2
+    uncertain = np.std(parts, ddof=1) / PARTS**0.5
     reference = picture(scene, REFERENCE, 1000)
     errors = [
         np.sqrt(((picture(scene, DENOISED, seed, True) - reference) ** 2).mean())
         for seed in range(2000, 2004)
     ]
-    return float(variance), float(np.mean(errors) / reference.mean())
+    return variance / scale, uncertain / scale, float(np.mean(errors) / reference.mean())
 
 
 def materials_of(record: Record) -> dict[str, bpy.types.Material]:
@@ -113,8 +118,8 @@ def main() -> None:
     parser.add_argument("files", nargs="+", type=Path)
     options = parser.parse_args()
     print(f"at most {LIMIT} is wanted of both ratios\n")
-    print("| material | kind | variance | ratio | denoised error | ratio |")
-    print("|---" * 6 + "|")
+    print("| material | kind | variance | standard error | ratio | denoised error | ratio |")
+    print("|---" * 7 + "|")
     for file in options.files:
         record = pictures.with_closures(record_of(file, model="interpolated", norm=VISUAL_NORM))
         with quiet():
@@ -124,12 +129,13 @@ def main() -> None:
         for name, material in materials_of(record).items():
             with quiet():
                 scene.objects["Sphere"].data.materials[0] = material
-                found = noise_of(scene)
-            unit = unit or found
-            cells = [
-                f"{value:.4g} | {value / of:.2f}" for value, of in zip(found, unit, strict=True)
-            ]
-            print(f"| {record.name} | {name} | {' | '.join(cells)} |", flush=True)
+                variance, uncertain, denoised = noise_of(scene)
+            unit = unit or (variance, denoised)
+            print(
+                f"| {record.name} | {name} | {variance:.4g} | {uncertain:.2g} | "
+                f"{variance / unit[0]:.2f} | {denoised:.4g} | {denoised / unit[1]:.2f} |",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":
