@@ -61,12 +61,14 @@ class RowFiller {
   }
 
   FoldedRow operator()(int h, int d) const {
-    const double sin2_h = square(t_.sin_h[h]), cos2_h = square(t_.cos_h[h]);
     const double along = t_.cos_h[h] * t_.cos_d[d], across = t_.sin_h[h] * t_.sin_d[d];
-    // See LobeCoordinates.
-    const Row u_phong =
-        2 * sin2_h * (square(t_.cos_d[d]) + square(t_.sin_d[d]) * cos_phi_.square());
-    const Row u_blinn = Row::Constant(sin2_h * (1 + cos2_h));
+    Row u_phong, u_blinn;
+    for (int p = 0; p < Row::SizeAtCompileTime; ++p) {
+      const LobeCoordinates at =
+          lobe_coordinates(t_.sin_h[h], t_.cos_h[h], t_.cos_d[d], t_.sin_d[d] * cos_phi_[p]);
+      u_phong[p] = at.u_phong;
+      u_blinn[p] = at.u_blinn;
+    }
     const double fresnel = lobe_.ior ? fresnel_reflectance(t_.cos_d[d], *lobe_.ior).value : 1;
     FoldedRow row;
     Row power;

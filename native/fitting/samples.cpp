@@ -118,24 +118,22 @@ class Builder {
     }
   }
 
-  // The samples of one theta_h and theta_d, written from `at` on. Phi_d enters the lobe through its
-  // squared cosine alone, see LobeCoordinates.
+  // The samples of one theta_h and theta_d, written from `at` on.
   void fill_row(int h, int d, int first, std::size_t at) {
-    const double sin2_h = square(t_.sin_h[h]), cos2_h = square(t_.cos_h[h]);
     const double along = t_.cos_h[h] * t_.cos_d[d], across = t_.sin_h[h] * t_.sin_d[d];
     const double scale = solid_angle(h, d);
-    const int row = Measurement::index(h, d, 0);
-    const double* const values = measurement_.planes().data() + row;
+    const double* const values = measurement_.planes().data() + Measurement::index(h, d, 0);
     for (int p = first; p < folded_phi_bins; ++p, ++at) {
-      const double cos2_phi = square(t_.cos_phi[p]);
-      samples_.u_phong[at] = 2 * sin2_h * (square(t_.cos_d[d]) + square(t_.sin_d[d]) * cos2_phi);
-      samples_.u_blinn[at] = sin2_h * (1 + cos2_h);
+      const LobeCoordinates lobe =
+          lobe_coordinates(t_.sin_h[h], t_.cos_h[h], t_.cos_d[d], t_.sin_d[d] * t_.cos_phi[p]);
+      samples_.u_phong[at] = lobe.u_phong;
+      samples_.u_blinn[at] = lobe.u_blinn;
       const int mirrored = Measurement::phi_d_bins - 1 - p;
       const bool here = !std::isnan(values[p]), there = !std::isnan(values[mirrored]);
       if (!here && !there) continue;
       double weight = here && there ? 1 : 0.5;
       if (norm_ == Norm::cosine_l1) {
-        weight *= scale * (square(along) - square(across) * cos2_phi);
+        weight *= scale * (square(along) - square(across * t_.cos_phi[p]));
       }
       samples_.weight[at] = static_cast<float>(weight);
       const int bins[2] = {here ? p : mirrored, there ? mirrored : p};

@@ -56,11 +56,8 @@ Parameters as_interpolated(const Parameters& parameters) {
 }
 
 LobeCoordinates lobe_coordinates(const HalfDifference& point) {
-  const double sin_h = std::sin(point.theta_h), cos_h = std::cos(point.theta_h);
-  const double cos_d = std::cos(point.theta_d);
-  const double along = std::sin(point.theta_d) * std::cos(point.phi_d);
-  return {2 * sin_h * sin_h * (cos_d * cos_d + along * along), sin_h * sin_h * (1 + cos_h * cos_h),
-          cos_d};
+  return lobe_coordinates(std::sin(point.theta_h), std::cos(point.theta_h), std::cos(point.theta_d),
+                          std::sin(point.theta_d) * std::cos(point.phi_d));
 }
 
 double lobe_power(const LobeCoordinates& at, double interpolation, double exponent) {

@@ -54,6 +54,11 @@ struct LobeCoordinates {
 };
 
 LobeCoordinates lobe_coordinates(const HalfDifference& point);
+// The same from sine and cosine of theta_h, cos theta_d and along = sin theta_d cos phi_d.
+inline LobeCoordinates lobe_coordinates(double sin_h, double cos_h, double cos_d, double along) {
+  const double sin2_h = sin_h * sin_h;
+  return {2 * sin2_h * (cos_d * cos_d + along * along), sin2_h * (1 + cos_h * cos_h), cos_d};
+}
 
 // base^s, 0 where base <= 0.
 double lobe_power(const LobeCoordinates& at, double interpolation, double exponent);
