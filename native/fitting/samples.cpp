@@ -63,7 +63,7 @@ void begin_run(Samples& samples, double cos_theta_d) {
 void end_run(Samples& samples) {
   const std::size_t padded =
       (samples.size() + Samples::padding - 1) / Samples::padding * Samples::padding;
-  for_each_column(samples, [padded](auto& column) { column.resize(padded); });
+  for_each_column(samples, [padded](auto& column) { column.resize(padded, 0); });
   samples.runs.back().end = padded;
   if (samples.runs.back().begin == padded) samples.runs.pop_back();
 }
@@ -116,6 +116,12 @@ class Builder {
       fill_row(h, d, first, at);
       at += static_cast<std::size_t>(folded_phi_bins - first);
     }
+    for (; at < samples_.runs[static_cast<std::size_t>(r)].end; ++at) leave_empty(at);
+  }
+
+  // A sample without a value.
+  void leave_empty(std::size_t at) {
+    for_each_column(samples_, [at](auto& column) { column[at] = 0; });
   }
 
   // The samples of one theta_h and theta_d, written from `at` on.
@@ -124,13 +130,16 @@ class Builder {
     const double scale = solid_angle(h, d);
     const double* const values = measurement_.planes().data() + Measurement::index(h, d, 0);
     for (int p = first; p < folded_phi_bins; ++p, ++at) {
+      const int mirrored = Measurement::phi_d_bins - 1 - p;
+      const bool here = !std::isnan(values[p]), there = !std::isnan(values[mirrored]);
+      if (!here && !there) {
+        leave_empty(at);
+        continue;
+      }
       const LobeCoordinates lobe =
           lobe_coordinates(t_.sin_h[h], t_.cos_h[h], t_.cos_d[d], t_.sin_d[d] * t_.cos_phi[p]);
       samples_.u_phong[at] = lobe.u_phong;
       samples_.u_blinn[at] = lobe.u_blinn;
-      const int mirrored = Measurement::phi_d_bins - 1 - p;
-      const bool here = !std::isnan(values[p]), there = !std::isnan(values[mirrored]);
-      if (!here && !there) continue;
       double weight = here && there ? 1 : 0.5;
       if (norm_ == Norm::cosine_l1) {
         weight *= scale * (square(along) - square(across * t_.cos_phi[p]));

@@ -3,6 +3,9 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
 #include "fitting/kernel.h"
@@ -10,6 +13,26 @@
 #include "measurement/measurement.h"
 
 namespace lobefit {
+
+// Memory that a vector leaves as it is when it grows without a value: it costs as much to touch for
+// the first time as a fit takes for a pass, so that the threads which fill it share that.
+template <typename T>
+struct UntouchedMemory : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = UntouchedMemory<U>;
+  };
+  template <typename U>
+  void construct(U* at) {
+    ::new (static_cast<void*>(at)) U;
+  }
+  template <typename U, typename... Arguments>
+  void construct(U* at, Arguments&&... arguments) {
+    ::new (static_cast<void*>(at)) U(std::forward<Arguments>(arguments)...);
+  }
+};
+template <typename T>
+using SampleColumn = std::vector<T, UntouchedMemory<T>>;
 
 // A model sees phi_d through cos^2 alone, so the bins phi_d and 180 deg - phi_d share one
 // evaluation and make one sample. Both measured values are kept, since they differ by up to 17 %
@@ -28,10 +51,10 @@ struct Samples {
 
   std::vector<Run> runs;
   // lobe_coordinates; in double, because 1 - u counts where u is close to 1.
-  std::vector<double> u_phong, u_blinn;
-  std::vector<float> weight;  // of each of the two measured values
+  SampleColumn<double> u_phong, u_blinn;
+  SampleColumn<float> weight;  // of each of the two measured values
   // measured[channel][half]: f, or log(f + log_offset) for Norm::log_l2.
-  std::array<std::array<std::vector<float>, 2>, 3> measured;
+  std::array<std::array<SampleColumn<float>, 2>, 3> measured;
   double unit = 1;  // the median reflectance, in 1/sr
 
   std::size_t size() const { return weight.size(); }

@@ -66,7 +66,7 @@ class ReflectanceSolver {
     float w = 0, wg = 0, wgg = 0, r = 0, rg = 0, true_value = 0;
   };
 
-  static Column column(const std::vector<float>& from) {
+  static Column column(const SampleColumn<float>& from) {
     return Eigen::Map<const Column>(from.data(), static_cast<Eigen::Index>(from.size()));
   }
 
