@@ -191,6 +191,33 @@ def test_one_bad_file_does_not_stop_the_others(tmp_path, table, capfd):
     assert os.listdir(tmp_path / "out") == ["good.json"]
 
 
+def test_a_folder_goes_on_where_it_stopped(tmp_path, table, capfd):
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.binary").symlink_to(table)
+    out = tmp_path / "out"
+    command = ["fit", str(tmp_path), "--model", "modified-phong", "-o", str(out)]
+    assert main(command) == 0
+    assert "kept" not in capfd.readouterr().err
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    (out / "two.json").write_text("{")  # as no kill of ours leaves it
+    assert main(command) == 0
+    told = capfd.readouterr()
+    assert "1 of 2 kept" in told.err
+    assert told.out.count("modified-phong") == 2
+    assert (out / "one.json").read_bytes() == before["one.json"]
+    assert Record.load(out / "two.json").parameters == Record.load(out / "one.json").parameters
+    # Another setting, another file, and what is asked for anew are computed.
+    assert main([*command, "--norm", "l2"]) == 0
+    assert "kept" not in capfd.readouterr().err
+    assert Record.load(out / "one.json").norm == "l2"
+    (tmp_path / "two.binary").unlink()
+    write_table(tmp_path / "two.binary")
+    assert main([*command, "--norm", "l2"]) == 0
+    assert "1 of 2 kept" in capfd.readouterr().err
+    assert main([*command, "--norm", "l2", "--again"]) == 0
+    assert "kept" not in capfd.readouterr().err
+
+
 def test_a_record_cannot_be_written_onto_a_folder(tmp_path, table, capfd):
     assert "found a folder" in refuse(capfd, "fit", table, "-o", tmp_path)
 

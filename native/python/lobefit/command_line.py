@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -18,7 +19,14 @@ from lobefit import _native, blender, picture, pictures, preview, report, simpli
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
-from lobefit.inputs import MEASUREMENT_SUFFIXES, RECORD_SUFFIX, Progress, record_of, spread
+from lobefit.inputs import (
+    MEASUREMENT_SUFFIXES,
+    RECORD_SUFFIX,
+    Progress,
+    kept_record,
+    record_of,
+    spread,
+)
 from lobefit.origin import origin_of, write_samples
 from lobefit.record import MODELS, VISUAL_NORM, Record
 
@@ -139,10 +147,7 @@ def _add_fit(commands: Any) -> None:
     command = _add(commands, _fit, "fit a model to measured files")
     command.add_argument("files", metavar="FILE", nargs="+", help="measured files, or folders")
     _add_fit_options(command, model="interpolated", norm="l1")
-    command.add_argument(
-        "-o", dest="output", required=True, help="RECORD.json, or a folder for several files"
-    )
-    _add_json(command)
+    _add_record_output(command)
 
 
 def _add_closures(commands: Any) -> None:
@@ -151,8 +156,17 @@ def _add_closures(commands: Any) -> None:
     command.add_argument("--target", choices=TARGETS, default="measured", help=_DEFAULT)
     _add_closure_options(command)
     _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
+    _add_record_output(command)
+
+
+def _add_record_output(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "-o", dest="output", required=True, help="RECORD.json, or a folder for several files"
+    )
+    command.add_argument(
+        "--again",
+        action="store_true",
+        help="also what a folder already holds, of the same settings",
     )
     _add_json(command)
 
@@ -355,24 +369,60 @@ def _write_records(
     if not one:
         make_folder(output)
 
+    batch = Batch(len(paths))
+
     def write_one(path: Path) -> None:
         place = output if one else output / f"{path.stem}{RECORD_SUFFIX}"
         place_to_write(place)
-        record = _record(path, options, closures)
-        record.save(place)
+        fitted = _fit_options(options)
+        # A folder that was interrupted goes on where it stopped.
+        keeps = not one and not options.again
+        record = kept_record(place, path, closures, **fitted) if keeps else None
+        name = batch.next(path, kept=record is not None)
+        if record is None:
+            with progress_bar(name) as progress:
+                record = record_of(path, progress, closures=closures, **fitted)
+            record.save(place)
         if options.json:
             print(json.dumps({"record": str(place)} | json.loads(record.to_json())))
         else:
             tell(record, place)
 
-    return for_each(paths, write_one)
+    code = for_each(paths, write_one)
+    if batch.kept:
+        kept = f"{batch.kept} of {batch.count} kept from before (--again computes them anew)"
+        print(f"lobefit: {kept}", file=sys.stderr)
+    return code
+
+
+class Batch:
+    """How far a command is through its files."""
+
+    def __init__(self, count: int) -> None:
+        self.count, self.kept = count, 0
+        self._begun, self._start = 0, time.monotonic()
+
+    def next(self, path: Path, kept: bool) -> str:
+        """What stands before the bar of the next file: its number, and the time left for all."""
+        computed = self._begun - self.kept
+        self._begun += 1
+        self.kept += kept
+        if self.count == 1:
+            return path.name
+        # What is kept takes no time.
+        each = (time.monotonic() - self._start) / max(computed, 1)
+        left = f", {each * (self.count - self._begun + 1):.0f} s left" if computed else ""
+        return f"{self._begun}/{self.count}{left}: {path.name}"
+
+
+def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
+    names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
+    return {name: getattr(options, name) for name in names}
 
 
 def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures] = ()) -> Record:
-    names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
-    fitted = {name: getattr(options, name) for name in names}
     with progress_bar(path.name) as progress:
-        return record_of(path, progress, closures=closures, **fitted)
+        return record_of(path, progress, closures=closures, **_fit_options(options))
 
 
 def _print_closures(asked: Closures, record: Record, place: Path) -> None:

@@ -5,13 +5,15 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from lobefit._native import InputError
+from lobefit._native import InputError, build_id
 from lobefit.atomic import reason
 from lobefit.fitting import Closures, fit
-from lobefit.record import Record
+from lobefit.origin import origin_of
+from lobefit.record import MODELS, Record
 
 MEASUREMENT_SUFFIXES = (".binary",)
 RECORD_SUFFIX = ".json"
+_KEPT_OPTIONS = ("schedule", "norm", "channels", "max_angle")
 
 Progress = Callable[[float, str], None]
 
@@ -54,3 +56,27 @@ def record_of(
         return record
     threads = options.get("threads", 0)
     return fit(record, progress=progress, closures=missing, threads=threads)
+
+
+def kept_record(
+    place: Path, path: Path, closures: Sequence[Closures] = (), **options: Any
+) -> Record | None:
+    """The record at `place` if the same build made it of the same file with the same options.
+
+    `options` are those of `Job`. None for what has to be computed, and where `path` is a record.
+    """
+    if path.suffix.lower() == RECORD_SUFFIX or not place.is_file():
+        return None
+    try:
+        record = Record.load(place)
+        same = (
+            record.machine.get("build") == build_id
+            and list(record.fits)
+            == (list(MODELS) if options["model"] == "all" else [options["model"]])
+            and (record.parameters["ior"] is not None) == options["fresnel"]
+            and all(getattr(record, name) == options[name] for name in _KEPT_OPTIONS)
+            and all(request.is_in(record) for request in closures)
+        )
+        return record if same and origin_of(path).sha256 == record.source["sha256"] else None
+    except InputError:
+        return None
