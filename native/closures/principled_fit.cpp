@@ -41,8 +41,9 @@ const Vector& greatest() {
 }
 
 // One channel depends on the four shared sockets and two of its own, in this order.
-constexpr int own_unknowns = 6;
-using Dual = ceres::Jet<double, own_unknowns>;
+constexpr int shared_unknowns = 4, own_unknowns = shared_unknowns + 2;
+using SharedDual = ceres::Jet<double, shared_unknowns>;
+using ColourDual = ceres::Jet<double, 2>;
 
 // The unknown that each of them is.
 using OwnUnknowns = std::array<int, own_unknowns>;
@@ -167,25 +168,41 @@ struct NormalEquations {
   Vector gradient = Vector::Zero();
 };
 
+// principled_channel, and its derivatives: those by shared sockets come from what the channels
+// share, those by the two colours from the metal's Fresnel term alone.
+double differentiate_channel(const PrincipledAtLight<SharedDual>& light, double base_color,
+                             double specular_tint,
+                             Eigen::Matrix<double, own_unknowns, 1>& derivatives) {
+  const ColourDual fresnel =
+      metal_fresnel(ColourDual(base_color, 0), ColourDual(specular_tint, 1), light.wi_h);
+  const SharedDual value = light.metal * fresnel.a + light.dielectric * specular_tint +
+                           light.untinted + light.diffuse * base_color;
+  derivatives << value.v, light.metal.a * fresnel.v[0] + light.diffuse.a,
+      light.metal.a * fresnel.v[1] + light.dielectric.a;
+  return value.a;
+}
+
 NormalEquations linearise(const Views& views, const Vector& x, double smoothing) {
   using std::exp;
   const int brightest = brightest_tint(x);
-  const SharedSockets<Dual> shared = {Dual(x[metallic], 0), exp(Dual(x[log_roughness], 1)),
-                                      Dual(x[root], 2), Dual(x[tint + brightest], 3)};
+  const SharedSockets<SharedDual> shared = {
+      SharedDual(x[metallic], 0), exp(SharedDual(x[log_roughness], 1)), SharedDual(x[root], 2),
+      SharedDual(x[tint + brightest], 3)};
   const auto of_view = [&](const View& view) {
     ChannelEquations sums;
+    Eigen::Matrix<double, own_unknowns, 1> slope;
     const auto at_view = principled_at_view(shared, view.n_wo);
     for (const Sample& sample : view.samples) {
       const auto light = principled_at_light(shared, at_view, sample.at);
       const double e = smoothing * sample.typical;
       for (std::size_t c = 0; c < 3; ++c) {
         const auto channel = static_cast<Eigen::Index>(c);
-        const Dual value =
-            principled_channel(light, Dual(x[base + channel], 4), Dual(x[tint + channel], 5));
-        const double r = value.a - sample.target[channel];
+        const double value =
+            differentiate_channel(light, x[base + channel], x[tint + channel], slope);
+        const double r = value - sample.target[channel];
         const double weight = sample.weight / std::sqrt(r * r + e * e);
-        sums.matrices[c].noalias() += (weight * value.v) * value.v.transpose();
-        sums.gradients[c] += (weight * r) * value.v;
+        sums.matrices[c].noalias() += (weight * slope) * slope.transpose();
+        sums.gradients[c] += (weight * r) * slope;
       }
     }
     return sums;
