@@ -131,57 +131,55 @@ double merged(double first, double second) {
 class RowReader {
  public:
   RowReader(const std::filesystem::path& path, std::FILE* file, int phi_bins)
-      : path_(path), file_(file), row_size_(Measurement::theta_d_bins * phi_bins) {
-    // Rows are read whole: a buffer between would only copy them.
+      : path_(path), file_(file), phi_bins_(phi_bins) {
+    // Pieces are read whole: a buffer between would only copy them.
     std::setvbuf(file, nullptr, _IONBF, 0);
   }
 
-  // Threads take turns at the file and convert what they read at the same time.
+  // Threads take turns at the file. What they read goes through a piece of memory that is small and
+  // their own, so that they touch the rows' memory for the first time, which is slow, all at once.
   void operator()(int h, const Measurement::Rows& rows) {
-    if (row_size_ == Measurement::row_size) {
-      read(h, rows);
-      for (std::size_t c = 0; c < 3; ++c) {
-        for (int i = 0; i < row_size_; ++i) rows[c][i] *= channel_scale[c];
-      }
-      return;
-    }
-    std::vector<double> stored(3 * static_cast<std::size_t>(row_size_));
-    read(h, {stored.data(), stored.data() + row_size_, stored.data() + 2 * row_size_});
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double* const from = stored.data() + c * static_cast<std::size_t>(row_size_);
-      for (int i = 0; i < Measurement::row_size; ++i) {
-        rows[c][i] = channel_scale[c] * folded(from, i);
+    std::array<double, piece_theta_d * double_phi_bins> piece;
+    for (int c = 0; c < 3; ++c) {
+      for (int d = 0; d < Measurement::theta_d_bins; d += piece_theta_d) {
+        read(Measurement::theta_d_bins * (h + Measurement::theta_h_bins * c) + d, piece.data());
+        double* const to = rows[static_cast<std::size_t>(c)] + d * Measurement::phi_d_bins;
+        for (int i = 0; i < piece_theta_d * Measurement::phi_d_bins; ++i) {
+          to[i] = channel_scale[c] * stored(piece.data(), i);
+        }
       }
     }
   }
 
  private:
-  void read(int h, const Measurement::Rows& rows) {
+  static constexpr int piece_theta_d = 18;
+  static_assert(Measurement::theta_d_bins % piece_theta_d == 0);
+
+  // Reads `piece_theta_d` steps of theta_d from the first-th in the file on.
+  void read(int first, double* values) {
+    const auto before = static_cast<std::size_t>(phi_bins_) * static_cast<std::size_t>(first);
+    const auto count = static_cast<std::size_t>(phi_bins_ * piece_theta_d);
+    const auto offset = static_cast<long>(sizeof(Dimensions) + sizeof(double) * before);
     const std::lock_guard lock(turn_);
-    for (int c = 0; c < 3; ++c) {
-      const std::int64_t before =
-          std::int64_t{row_size_} * (h + c * std::int64_t{Measurement::theta_h_bins});
-      const auto offset = static_cast<std::int64_t>(sizeof(Dimensions) + sizeof(double) * before);
-      const auto count = static_cast<std::size_t>(row_size_);
-      if (std::fseek(file_, static_cast<long>(offset), SEEK_SET) != 0 ||
-          std::fread(rows[static_cast<std::size_t>(c)], sizeof(double), count, file_) != count) {
-        fail(path_,
-             "expected a whole table, found its end earlier; did the file change while it "
-             "was read?");
-      }
+    if (std::fseek(file_, offset, SEEK_SET) != 0 ||
+        std::fread(values, sizeof(double), count, file_) != count) {
+      fail(path_,
+           "expected a whole table, found its end earlier; did the file change while it was read?");
     }
   }
 
-  // [360] -> [180]: phi_d and phi_d + 180 deg are the same bin by reciprocity.
-  static double folded(const double* stored, int i) {
+  // The i-th of 180 steps of phi_d of a piece. Of 360, phi_d and phi_d + 180 deg are the same bin
+  // by reciprocity.
+  double stored(const double* piece, int i) const {
+    if (phi_bins_ == Measurement::phi_d_bins) return piece[i];
     const int row = i / Measurement::phi_d_bins, p = i % Measurement::phi_d_bins;
-    const double* const values = stored + row * double_phi_bins;
+    const double* const values = piece + row * double_phi_bins;
     return merged(values[p], values[p + Measurement::phi_d_bins]);
   }
 
   const std::filesystem::path& path_;
   std::FILE* const file_;
-  const int row_size_;
+  const int phi_bins_;
   std::mutex turn_;
 };
 
