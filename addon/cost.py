@@ -17,7 +17,7 @@ import bmesh
 import bpy
 from mathutils import Vector
 
-from .nodes.tree import empty_shader_tree
+from .nodes.tree import empty_shader_tree, show_grey
 from .scene import uniform_world
 
 Name = TypeVar("Name")
@@ -87,10 +87,7 @@ def diffuse_material(name: str = "Diffuse", albedo: float = 1.0) -> bpy.types.Ma
     """A new material of one grey Diffuse BSDF, the least a surface can cost."""
     material = bpy.data.materials.new(name)
     tree = empty_shader_tree(material)
-    shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    shader.inputs["Color"].default_value = (albedo, albedo, albedo, 1.0)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    show_grey(tree, "ShaderNodeBsdfDiffuse", "ShaderNodeOutputMaterial", albedo)
     return material
 
 

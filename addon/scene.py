@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from .nodes.tree import empty_shader_tree
+from .nodes.tree import empty_shader_tree, show_grey
 
 # Directions toward the lights, seen from a camera at +z with x to the right and y up: one from the
 # upper right, one behind the lower left that grazes the rim.
@@ -52,10 +52,7 @@ def uniform_world(name: str, radiance: float) -> bpy.types.World:
     """A new world, grey and the same from everywhere."""
     world = bpy.data.worlds.new(name)
     tree = empty_shader_tree(world)
-    background = tree.nodes.new("ShaderNodeBackground")
-    background.inputs["Color"].default_value = (radiance, radiance, radiance, 1.0)
-    output = tree.nodes.new("ShaderNodeOutputWorld")
-    tree.links.new(background.outputs[0], output.inputs["Surface"])
+    show_grey(tree, "ShaderNodeBackground", "ShaderNodeOutputWorld", radiance)
     return world
 
 

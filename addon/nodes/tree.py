@@ -217,3 +217,10 @@ def empty_shader_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.
         owner.use_nodes = True
     owner.node_tree.nodes.clear()
     return owner.node_tree
+
+
+def show_grey(tree: bpy.types.NodeTree, shader: str, output: str, value: float) -> None:
+    """Adds a shader node of one grey Color and the output node that shows it, by their types."""
+    grey = tree.nodes.new(shader)
+    grey.inputs["Color"].default_value = (value, value, value, 1.0)
+    tree.links.new(grey.outputs[0], tree.nodes.new(output).inputs["Surface"])

@@ -105,14 +105,13 @@ Sum sum_over_views(const Views& views, Sum sum, OfView&& of_view) {
   return sum;
 }
 
-// The sum of an amount over all samples, given what the sockets reflect there; threads may ask for
-// amounts at the same time.
-template <typename Amount>
-double sum_over(const Views& views, const Vector& x, Amount&& amount) {
+// The sum of an amount over all samples, given what the sockets reflect there.
+template <typename Sum, typename Amount>
+Sum sum_over(const Views& views, const Vector& x, const Sum& zero, Amount&& amount) {
   const SharedSockets<double> shared = {x[metallic], std::exp(x[log_roughness]), x[root],
                                         x.segment<3>(tint).maxCoeff()};
-  return sum_over_views(views, 0.0, [&](const View& view) {
-    double sum = 0;
+  return sum_over_views(views, zero, [&](const View& view) {
+    Sum sum = zero;
     const auto at_view = principled_at_view(shared, view.n_wo);
     for (const Sample& sample : view.samples) {
       const auto light = principled_at_light(shared, at_view, sample.at);
@@ -128,14 +127,14 @@ double sum_over(const Views& views, const Vector& x, Amount&& amount) {
 
 // The distance to the target by error_of, up to a factor where views or lights are left out.
 double error_of(const Views& views, const Vector& x) {
-  return sum_over(views, x, [](const Sample& sample, const Rgb& reflected) {
+  return sum_over(views, x, 0.0, [](const Sample& sample, const Rgb& reflected) {
     return sample.weight * (reflected - sample.target).abs().sum();
   });
 }
 
 // The same with |r| made smooth as sqrt(r^2 + e^2) - e, e = smoothing x typical.
 double smooth_error(const Views& views, const Vector& x, double smoothing) {
-  return sum_over(views, x, [smoothing](const Sample& sample, const Rgb& reflected) {
+  return sum_over(views, x, 0.0, [smoothing](const Sample& sample, const Rgb& reflected) {
     const double e = smoothing * sample.typical;
     const Rgb r2 = (reflected - sample.target).square();
     // r^2 / (sqrt(r^2 + e^2) + e) keeps its digits where r is small.
@@ -175,8 +174,7 @@ double differentiate_channel(const PrincipledAtLight<SharedDual>& light, double 
                              Eigen::Matrix<double, own_unknowns, 1>& derivatives) {
   const ColourDual fresnel =
       metal_fresnel(ColourDual(base_color, 0), ColourDual(specular_tint, 1), light.wi_h);
-  const SharedDual value = light.metal * fresnel.a + light.dielectric * specular_tint +
-                           light.untinted + light.diffuse * base_color;
+  const SharedDual value = principled_sum(light, fresnel.a, base_color, specular_tint);
   derivatives << value.v, light.metal.a * fresnel.v[0] + light.diffuse.a,
       light.metal.a * fresnel.v[1] + light.dielectric.a;
   return value.a;
@@ -295,13 +293,14 @@ std::vector<Vector> starts(const Views& views) {
       return x;
     };
     const Vector white = start(Rgb::Ones(), Rgb::Ones(), 1, 0.2);
-    Rgb wanted = Rgb::Zero(), given = Rgb::Zero();
-    sum_over(views, white, [&](const Sample& sample, const Rgb& reflected) {
-      wanted += sample.weight * sample.target;
-      given += sample.weight * reflected;
-      return 0.0;
-    });
-    const Rgb metal = (wanted / given).cwiseMin(1);
+    using Both = Eigen::Array<double, 3, 2>;  // wanted, given
+    const Both light = sum_over(views, white, Both(Both::Zero()),
+                                [](const Sample& sample, const Rgb& reflected) -> Both {
+                                  Both both;
+                                  both << sample.weight * sample.target, sample.weight * reflected;
+                                  return both;
+                                });
+    const Rgb metal = (light.col(0) / light.col(1)).cwiseMin(1);
     all.push_back(start(albedo, Rgb::Ones(), 0, 0.2));
     all.push_back(start(metal, Rgb::Constant(0.8), 1, 0.2));
     all.push_back(start((metal + albedo) / 2, Rgb::Constant(0.8), 0.5, 0.2));

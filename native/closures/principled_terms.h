@@ -78,8 +78,8 @@ inline double dielectric_fresnel(double cosine, double ior) {
 }
 template <typename Dual>
 Dual dielectric_fresnel(double cosine, const Dual& ior) {
-  const auto [value, derivative, unused] = fresnel_reflectance(cosine, ior.a);
-  return Dual(value, derivative * ior.v);
+  const FresnelReflectance fresnel = fresnel_reflectance(cosine, ior.a);
+  return Dual(fresnel.value, fresnel.derivative * ior.v);
 }
 
 template <typename T>
@@ -184,12 +184,20 @@ PrincipledAtLight<T> principled_at_light(const SharedSockets<T>& shared,
   return {metal, square(root) * (dielectric - untinted), untinted, view.diffuse * at.n_wi, at.wi_h};
 }
 
+// f cos of a channel whose metal reflects `fresnel` of the lobe.
+template <typename T, typename Colour>
+T principled_sum(const PrincipledAtLight<T>& light, const Colour& fresnel, const Colour& base_color,
+                 const Colour& specular_tint) {
+  return light.metal * fresnel + light.dielectric * specular_tint + light.untinted +
+         light.diffuse * base_color;
+}
+
 // f cos of a channel.
 template <typename T>
 T principled_channel(const PrincipledAtLight<T>& light, const T& base_color,
                      const T& specular_tint) {
-  return light.metal * metal_fresnel(base_color, specular_tint, light.wi_h) +
-         light.dielectric * specular_tint + light.untinted + light.diffuse * base_color;
+  return principled_sum(light, metal_fresnel(base_color, specular_tint, light.wi_h), base_color,
+                        specular_tint);
 }
 
 }  // namespace lobefit

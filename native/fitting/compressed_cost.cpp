@@ -45,7 +45,8 @@ bool CompressedCost::left_bounds(const double* free_values) const {
          Eigen::Map<const VectorXd>(free_values, static_cast<Eigen::Index>(free_.size()));
 }
 
-bool CompressedCost::compress(const double* free_values, Curvature curvature) const {
+std::optional<CompressedCost::Block> CompressedCost::compress(const double* free_values,
+                                                              Curvature curvature) const {
   const auto n = static_cast<Eigen::Index>(free_.size());
   const VectorXd x = within_bounds(free_values);
   const Evaluation at = objective_.evaluate(x, curvature);
@@ -58,36 +59,30 @@ bool CompressedCost::compress(const double* free_values, Curvature curvature) co
   MatrixXd scaled = scale.cwiseInverse().asDiagonal() * hessian * scale.cwiseInverse().asDiagonal();
   scaled.diagonal().array() += 1e-12;
   const Eigen::LLT<MatrixXd, Eigen::Upper> factor(scaled);
-  if (factor.info() != Eigen::Success && curvature == Curvature::newton) return false;
+  if (factor.info() != Eigen::Success && curvature == Curvature::newton) return {};
   const MatrixXd root = factor.matrixU();
   const VectorXd projected =
       root.transpose().triangularView<Eigen::Lower>().solve(gradient.cwiseQuotient(scale));
   const double rest = at.value - projected.squaredNorm();
-  if (!(rest >= 0) && curvature == Curvature::newton) return false;
-  jacobian_ = MatrixXd::Zero(n + 1, n);
-  jacobian_.topRows(n) = root * scale.asDiagonal();
-  residuals_.resize(n + 1);
-  residuals_.head(n) = projected;
-  residuals_[n] = std::sqrt(std::max(0.0, rest));
-  return true;
+  if (!(rest >= 0) && curvature == Curvature::newton) return {};
+  Block block{VectorXd(n + 1), MatrixXd::Zero(n + 1, n)};
+  block.jacobian.topRows(n) = root * scale.asDiagonal();
+  block.residuals << projected, std::sqrt(std::max(0.0, rest));
+  return block;
 }
 
 bool CompressedCost::Evaluate(double const* const* parameters, double* residuals,
                               double** jacobians) const {
   if (monitor_.cancelled()) return false;
   const auto n = static_cast<Eigen::Index>(free_.size());
-  const Eigen::Map<const VectorXd> point(parameters[0], n);
-  if (known_point_.size() != n || known_point_ != point) {
-    if (!compress(parameters[0], Curvature::newton)) {
-      compress(parameters[0], Curvature::reweighted);
-    }
-    known_point_ = point;
-  }
-  Eigen::Map<VectorXd>(residuals, n + 1) = residuals_;
+  // Ceres asks for value and derivatives of one point in two calls; the objective remembers it.
+  std::optional<Block> block = compress(parameters[0], Curvature::newton);
+  if (!block) block = compress(parameters[0], Curvature::reweighted);
+  Eigen::Map<VectorXd>(residuals, n + 1) = block->residuals;
   if (jacobians != nullptr && jacobians[0] != nullptr) {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Eigen::Map<RowMajor>(jacobians[0], n + 1, n) = jacobian_;
-    if (!left_bounds(parameters[0])) x_(free_) = point;
+    Eigen::Map<RowMajor>(jacobians[0], n + 1, n) = block->jacobian;
+    if (!left_bounds(parameters[0])) x_(free_) = Eigen::Map<const VectorXd>(parameters[0], n);
   }
   return true;
 }

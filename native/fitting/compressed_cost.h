@@ -4,6 +4,7 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "fitting/monitor.h"
@@ -44,18 +45,18 @@ class CompressedCost final : public ceres::CostFunction {
   bool left_bounds(const double* free_values) const;
 
  private:
-  // False where the curvature is Newton's and no sum of squares can have it.
-  bool compress(const double* free_values, Curvature curvature) const;
+  struct Block {
+    Eigen::VectorXd residuals;
+    Eigen::MatrixXd jacobian;
+  };
+  // Nothing where the curvature is Newton's and no sum of squares can have it.
+  std::optional<Block> compress(const double* free_values, Curvature curvature) const;
 
   const Objective& objective_;
   std::vector<int> free_;
   // Where the derivatives were last asked for: the point that the next step starts from.
   mutable Eigen::VectorXd x_;
   const Monitor& monitor_;
-  // Ceres asks for value and derivatives of one point in two calls; the second is answered from
-  // here.
-  mutable Eigen::VectorXd known_point_, residuals_;
-  mutable Eigen::MatrixXd jacobian_;
 };
 
 }  // namespace lobefit

@@ -41,9 +41,8 @@ struct Misfits {
   }
 };
 
-// A model sees cos^2 phi_d alone: one evaluation serves phi_d and 180 deg - phi_d. A row of folded
-// bins is padded to what the kernel takes at once.
-constexpr int folded_phi_bins = Measurement::phi_d_bins / 2;
+// A row of folded bins is padded to what the kernel takes at once.
+constexpr int folded_phi_bins = Measurement::folded_phi_bins;
 using Row = Eigen::Array<double, (folded_phi_bins + 3) / 4 * 4, 1>;
 
 // The model and what its misfit weighs on the folded bins of one theta_h and theta_d.
@@ -81,10 +80,8 @@ class RowFiller {
       row.model[static_cast<std::size_t>(c)] =
           lobe_.diffuse[c] / pi + lobe_.specular[c] * fresnel * power;
     }
-    const double width = h + 0.5;  // dtheta_h, up to a factor
     row.lower_cosine = along - across * cos_phi_;
-    row.weight = (t_.sin_h[h] * width * t_.sin_d[d] * t_.cos_d[d]) * row.lower_cosine *
-                 (along + across * cos_phi_);
+    row.weight = t_.solid_angle(h, d) * row.lower_cosine * (along + across * cos_phi_);
     return row;
   }
 

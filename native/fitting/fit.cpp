@@ -97,6 +97,7 @@ class Fitter {
     monitor_.report("Polishing on all bins", 0.6);
     const Minimum last =
         run_stage("polish on all bins", variables_.all(), finalists.front().x, last_precision());
+    // What the starts came to over all bins is where the last polish began.
     fit_.stages.front().error = mean_error(last.start_value);
     return last.x;
   }

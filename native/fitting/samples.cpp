@@ -10,7 +10,7 @@
 namespace lobefit {
 namespace {
 
-constexpr int folded_phi_bins = Measurement::phi_d_bins / 2;
+constexpr int folded_phi_bins = Measurement::folded_phi_bins;
 
 // The median of the finite values of all channels, found from one in `stride`, or something
 // positive in its place: values of a table that is mostly zero are measured by their mean, those of
@@ -127,7 +127,8 @@ class Builder {
   // The samples of one theta_h and theta_d, written from `at` on.
   void fill_row(int h, int d, int first, std::size_t at) {
     const double along = t_.cos_h[h] * t_.cos_d[d], across = t_.sin_h[h] * t_.sin_d[d];
-    const double scale = solid_angle(h, d);
+    // To a mean near 1 with both cosines.
+    const double scale = 32.0 / Measurement::theta_h_bins * t_.solid_angle(h, d);
     const double* const values = measurement_.planes().data() + Measurement::index(h, d, 0);
     for (int p = first; p < folded_phi_bins; ++p, ++at) {
       const int mirrored = Measurement::phi_d_bins - 1 - p;
@@ -153,12 +154,6 @@ class Builder {
         }
       }
     }
-  }
-
-  // sin(theta_h) dtheta_h sin(theta_d) cos(theta_d) to a mean near 1 with both cosines.
-  double solid_angle(int h, int d) const {
-    const double step = 2 * (h + 0.5) / Measurement::theta_h_bins;
-    return 16 * t_.sin_h[h] * step * t_.sin_d[d] * t_.cos_d[d];
   }
 
   float stored(double reflectance) const {

@@ -60,7 +60,7 @@ struct Samples {
   std::size_t size() const { return weight.size(); }
 };
 
-// All valid bins up to options.max_angle_degrees.
+// All bins above the horizon and up to options.max_angle_degrees; invalid ones weigh 0.
 Samples all_samples(const Measurement& measurement, const FitOptions& options);
 
 // About `count` of them, drawn with probability proportional to the square root of their distance

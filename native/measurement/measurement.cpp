@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "measurement/parallel.h"
 
@@ -41,9 +42,8 @@ BinCounts sift(int h, const Measurement::Rows& rows) {
     double* const blue = rows[2] + d * Measurement::phi_d_bins;
     for (int p = 0; p < Measurement::phi_d_bins; ++p) {
       const bool below = along <= across * std::abs(t.cos_phi[p]);
-      // No comparison with NaN holds; a sum that overflows is of numbers that mean nothing.
-      const bool finite = std::abs(red[p]) + std::abs(green[p]) + std::abs(blue[p]) <=
-                          std::numeric_limits<double>::max();
+      const bool finite =
+          std::isfinite(red[p]) && std::isfinite(green[p]) && std::isfinite(blue[p]);
       const bool negative = red[p] < 0 || green[p] < 0 || blue[p] < 0;
       const bool valid = !below && finite && !negative;
       counts.below_horizon += below;
@@ -98,6 +98,9 @@ Measurement::Measurement(const FillRows& fill, int threads)
 Measurement::Measurement(std::span<const double> planes)
     : Measurement(
           [planes](int h, const Rows& rows) {
+            if (planes.size() != 3 * static_cast<std::size_t>(bin_count)) {
+              throw std::invalid_argument("a measurement has three planes of 90 x 90 x 180 values");
+            }
             for (int c = 0; c < 3; ++c) {
               const auto from = planes.begin() + index(h, 0, 0) + c * bin_count;
               std::copy(from, from + row_size, rows[static_cast<std::size_t>(c)]);
@@ -114,6 +117,10 @@ Measurement Measurement::tabulate(const std::function<Rgb(const HalfDifference&)
         }
       },
       1);
+}
+
+double BinCentres::solid_angle(int h, int d) const {
+  return sin_h[h] * (h + 0.5) * sin_d[d] * cos_d[d];
 }
 
 const BinCentres& bin_centres() {

@@ -28,6 +28,8 @@ class Measurement {
   static constexpr int theta_h_bins = 90;
   static constexpr int theta_d_bins = 90;
   static constexpr int phi_d_bins = 180;
+  // A model sees phi_d through cos^2 alone: phi_d and 180 deg - phi_d are one of these.
+  static constexpr int folded_phi_bins = phi_d_bins / 2;
   static constexpr int bin_count = theta_h_bins * theta_d_bins * phi_d_bins;
 
   static constexpr int row_size = theta_d_bins * phi_d_bins;
@@ -78,6 +80,9 @@ struct BinCentres {
   std::array<double, Measurement::theta_h_bins> cos_h, sin_h;
   std::array<double, Measurement::theta_d_bins> cos_d, sin_d;
   std::array<double, Measurement::phi_d_bins> cos_phi;
+
+  // Of a bin, up to a factor: sin(theta_h) dtheta_h sin(theta_d) cos(theta_d).
+  double solid_angle(int h, int d) const;
 };
 const BinCentres& bin_centres();
 

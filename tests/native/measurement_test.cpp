@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "reflectance/abc.h"
@@ -75,6 +77,11 @@ TEST(Sample, IsThePublishedFitAtABin) {
       125.852753 / std::pow(1 + 1048834.875 * rise, 0.598443) * normal_fresnel / pi;
   // Half a degree of incidence changes the Fresnel term and the cosines by less than 1e-3.
   EXPECT_NEAR(sample.bin(0, 0, 0)[0], expected, 1e-3 * expected);
+}
+
+TEST(Measurement, RefusesPlanesOfAnotherSize) {
+  const std::vector<double> few(10, 0.5);
+  EXPECT_THROW(Measurement{std::span<const double>(few)}, std::invalid_argument);
 }
 
 }  // namespace
