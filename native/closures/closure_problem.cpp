@@ -8,7 +8,6 @@ namespace lobefit {
 namespace {
 
 using enum ClosureLayout::ShapeCurve;
-constexpr int n = ViewSplines::count;
 
 // Cycles 4.2 takes anything with alpha_x alpha_y below 5e-7 for a mirror, and single precision
 // loses the peak of a lobe much narrower than this.
@@ -21,6 +20,7 @@ struct Bounds {
 Bounds bounds_of(const ClosureLayout& layout) {
   Bounds bounds{Eigen::VectorXd::Zero(layout.unknowns()),
                 Eigen::VectorXd::Constant(layout.unknowns(), 1e6)};
+  const int n = layout.coefficients;
   for (int k = 0; k < layout.specular; ++k) {
     const auto set = [&](int curve, double least, double greatest) {
       bounds.least.segment(layout.shape(k, curve) * n, n).setConstant(least);
@@ -33,24 +33,19 @@ Bounds bounds_of(const ClosureLayout& layout) {
   return bounds;
 }
 
-// The values of all curves at one view angle, and the splines they come from.
+// The values of all curves at one view angle.
 struct AtView {
-  ViewSplines::Support support;
   Eigen::VectorXd curves;
   double sine;
 };
 
-AtView at_view(const Eigen::VectorXd& x, double cosine) {
-  AtView at{ViewSplines::at(cosine), Eigen::VectorXd(x.size() / n),
-            std::sqrt(std::max(0.0, 1 - cosine * cosine))};
-  for (int curve = 0; curve < at.curves.size(); ++curve) {
-    double value = 0;
-    for (int i = 0; i < 4; ++i) {
-      value += at.support.share[static_cast<std::size_t>(i)] * x[curve * n + at.support.first + i];
-    }
-    at.curves[curve] = value;
-  }
-  return at;
+AtView at_view(const ClosureCurves& closures, double cosine) {
+  const ClosureLayout& layout = closures.layout;
+  const auto [first, share] = ViewSplines::at(cosine, layout.coefficients);
+  const Eigen::Map<const Eigen::MatrixXd> coefficients(closures.x.data(), layout.coefficients,
+                                                       layout.curves());
+  return {coefficients.middleRows(first, share.size()).transpose() * share,
+          std::sqrt(std::max(0.0, 1 - cosine * cosine))};
 }
 
 // How far a closure may be bent at a view angle. Cycles bends a normal back whose mirror direction
@@ -87,14 +82,18 @@ ClippedShape clipped_shape(const AtView& at, const ClosureLayout& layout, int cl
 // |r| made smooth, sqrt(r^2 + e^2) - e, without loss of digits where r is small.
 double smooth(double r, double e) { return r * r / (std::sqrt(r * r + e * e) + e); }
 
-double view_error(const ClosureProblem& problem, const TargetView& view, const Eigen::VectorXd& x,
-                  double smoothing) {
-  const ClosureLayout& layout = problem.layout;
-  const AtView at = at_view(x, view.wo.z());
-  std::vector<Microfacet> closures;
+Microfacet microfacet(const ClosureCurves& closures, int closure, const Shape& shape,
+                      const Vector3& wo) {
+  return {closures.distributions[static_cast<std::size_t>(closure)], shape, wo};
+}
+
+double view_error(const ClosureCurves& closures, const TargetView& view, double smoothing) {
+  const ClosureLayout& layout = closures.layout;
+  const AtView at = at_view(closures, view.wo.z());
+  std::vector<Microfacet> specular;
   for (int k = 0; k < layout.specular; ++k) {
-    closures.emplace_back(problem.distributions[static_cast<std::size_t>(k)],
-                          clipped_shape(at, layout, k, view.wo.z()).shape, view.wo);
+    const Shape shape = clipped_shape(at, layout, k, view.wo.z()).shape;
+    specular.push_back(microfacet(closures, k, shape, view.wo));
   }
   const auto weights = [&](int closure) {
     return Rgb(at.curves.segment<3>(layout.weight(closure, 0)).array());
@@ -103,7 +102,7 @@ double view_error(const ClosureProblem& problem, const TargetView& view, const E
   for (const TargetLight& light : view.lights) {
     Rgb r = weights(layout.specular) * (light.wi.z() / pi) - light.reflected;
     for (int k = 0; k < layout.specular; ++k) {
-      r += weights(k) * closures[static_cast<std::size_t>(k)].evaluate(light.wi, light.half);
+      r += weights(k) * specular[static_cast<std::size_t>(k)].evaluate(light.wi, light.half);
     }
     const double e = smoothing * light.typical;
     error += light.weight * (smooth(r[0], e) + smooth(r[1], e) + smooth(r[2], e));
@@ -119,18 +118,17 @@ struct ViewEquations {
 
 // The number of closures is known when this is compiled, so that its inner loops unroll.
 template <int specular>
-ViewEquations linearise_view(const ClosureProblem& problem, const TargetView& view,
-                             const Eigen::VectorXd& x, double smoothing) {
+ViewEquations linearise_view(const ClosureCurves& closures, const TargetView& view,
+                             double smoothing) {
   constexpr int own = shape_curves * specular + specular + 1;
-  const ClosureLayout& layout = problem.layout;
-  const AtView at = at_view(x, view.wo.z());
+  const ClosureLayout& layout = closures.layout;
+  const AtView at = at_view(closures, view.wo.z());
   const double sine = at.sine;
   std::vector<ClippedShape> shapes;
-  std::vector<Microfacet> closures;
+  std::vector<Microfacet> microfacets;
   for (int k = 0; k < specular; ++k) {
     shapes.push_back(clipped_shape(at, layout, k, view.wo.z()));
-    closures.emplace_back(problem.distributions[static_cast<std::size_t>(k)], shapes.back().shape,
-                          view.wo);
+    microfacets.push_back(microfacet(closures, k, shapes.back().shape, view.wo));
   }
   // One channel depends on the shapes and on its own weights: the equations of the three channels
   // are kept apart until all lights are in.
@@ -146,7 +144,7 @@ ViewEquations linearise_view(const ClosureProblem& problem, const TargetView& vi
     for (int k = 0; k < specular; ++k) {
       const ClippedShape& shape = shapes[static_cast<std::size_t>(k)];
       const ShapeValue value =
-          closures[static_cast<std::size_t>(k)].evaluate_with_derivatives(light.wi, light.half);
+          microfacets[static_cast<std::size_t>(k)].evaluate_with_derivatives(light.wi, light.half);
       const double by_x = shape.x_free ? value.by_log_alpha_x : 0;
       const double by_y = shape.y_free ? value.by_log_alpha_y : 0;
       double* const by = by_shape.data() + shape_curves * k;
@@ -191,85 +189,89 @@ ViewEquations linearise_view(const ClosureProblem& problem, const TargetView& vi
   return sum;
 }
 
-ViewEquations linearise_view(const ClosureProblem& problem, const TargetView& view,
-                             const Eigen::VectorXd& x, double smoothing) {
+ViewEquations linearise_view(const ClosureCurves& closures, const TargetView& view,
+                             double smoothing) {
   static_assert(most_specular_closures == 3);
-  switch (problem.layout.specular) {
+  switch (closures.layout.specular) {
     case 0:
-      return linearise_view<0>(problem, view, x, smoothing);
+      return linearise_view<0>(closures, view, smoothing);
     case 1:
-      return linearise_view<1>(problem, view, x, smoothing);
+      return linearise_view<1>(closures, view, smoothing);
     case 2:
-      return linearise_view<2>(problem, view, x, smoothing);
+      return linearise_view<2>(closures, view, smoothing);
     default:
-      return linearise_view<3>(problem, view, x, smoothing);
+      return linearise_view<3>(closures, view, smoothing);
   }
 }
 
 // A little curvature costs a little error, so that curves are smooth where the target does not say:
 // the square of second differences of the coefficients. Weights are counted in their own size.
-constexpr double shape_stiffness = 3e-6, weight_stiffness = 3e-6;
+constexpr double stiffness = 1e-5;
+
+// Splines of half the width have twice as many second differences for the same curve, each a
+// quarter as large: they count eight times as much, that its cost stays the same.
+double stiffness_of(const ClosureLayout& layout) {
+  return stiffness * std::pow((layout.coefficients - 3.0) / (ViewSplines::coarse - 3.0), 3);
+}
+
+double stiffness_penalty(const ClosureCurves& closures) {
+  const ClosureLayout& layout = closures.layout;
+  const int n = layout.coefficients;
+  double penalty = 0;
+  for (int curve = 0; curve < layout.curves(); ++curve) {
+    for (int i = 1; i + 1 < n; ++i) {
+      const double* at = closures.x.data() + curve * n + i;
+      penalty += square(at[-1] - 2 * at[0] + at[1]);
+    }
+  }
+  return stiffness_of(layout) / 2 * penalty;
+}
 
 struct Equations {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd gradient;
 };
 
-double stiffness_of(const ClosureLayout& layout, int curve) {
-  return curve < shape_curves * layout.specular ? shape_stiffness : weight_stiffness;
-}
-
-double stiffness_penalty(const ClosureLayout& layout, const Eigen::VectorXd& x) {
-  double penalty = 0;
-  for (int curve = 0; curve < layout.curves(); ++curve) {
-    for (int i = 1; i + 1 < n; ++i) {
-      const double* at = x.data() + curve * n + i;
-      const double bent = at[-1] - 2 * at[0] + at[1];
-      penalty += stiffness_of(layout, curve) / 2 * bent * bent;
-    }
-  }
-  return penalty;
-}
-
-void add_penalty(const ClosureLayout& layout, const Eigen::VectorXd& x, Equations& equations) {
+void add_penalty(const ClosureCurves& closures, Equations& equations) {
+  const ClosureLayout& layout = closures.layout;
+  const int n = layout.coefficients;
   const Eigen::Vector3d difference(1, -2, 1);
+  const Eigen::Matrix3d both = stiffness_of(layout) * difference * difference.transpose();
   for (int curve = 0; curve < layout.curves(); ++curve) {
-    const double stiffness = stiffness_of(layout, curve);
     for (int i = curve * n; i + 2 < (curve + 1) * n; ++i) {
-      equations.matrix.block<3, 3>(i, i) += stiffness * difference * difference.transpose();
-      equations.gradient.segment<3>(i) += stiffness * difference.dot(x.segment<3>(i)) * difference;
+      equations.matrix.block<3, 3>(i, i) += both;
+      equations.gradient.segment<3>(i) += both * closures.x.segment<3>(i);
     }
   }
 }
 
-// Calls visit for every stride-th view of the problem.
-template <typename Visitor>
-void for_each_view(const ClosureProblem& problem, int stride, Visitor&& visit) {
-  for (std::size_t i = 0; i < problem.target->size(); i += static_cast<std::size_t>(stride)) {
-    visit((*problem.target)[i]);
-  }
-}
-
-Equations linearise(const ClosureProblem& problem, int stride, const Eigen::VectorXd& x,
-                    double smoothing) {
-  const int unknowns = problem.layout.unknowns(), curves = problem.layout.curves();
-  Equations sum{Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns)};
-  for_each_view(problem, stride, [&](const TargetView& view) {
-    const ViewEquations part = linearise_view(problem, view, x, smoothing);
-    const auto support = ViewSplines::at(view.wo.z());
-    const Eigen::Map<const Eigen::Vector4d> share(support.share.data());
-    const Eigen::Matrix4d both = stride * share * share.transpose();
+// Of the matrix the lower half.
+void linearise(const Target& target, const ClosureCurves& closures, double smoothing,
+               Equations& sum) {
+  const ClosureLayout& layout = closures.layout;
+  const int unknowns = layout.unknowns(), curves = layout.curves(), n = layout.coefficients;
+  sum.matrix.setZero(unknowns, unknowns);
+  sum.gradient.setZero(unknowns);
+  for (const TargetView& view : target) {
+    const ViewEquations part = linearise_view(closures, view, smoothing);
+    if (n == 1) {
+      sum.matrix += part.matrix;
+      sum.gradient += part.gradient;
+      continue;
+    }
+    const auto support = ViewSplines::at(view.wo.z(), n);
+    const Eigen::Vector4d share = support.share;
+    const Eigen::Matrix4d both = share * share.transpose();
     for (int q = 0; q < curves; ++q) {
-      sum.gradient.segment<4>(q * n + support.first) += stride * part.gradient[q] * share;
-      for (int p = 0; p < curves; ++p) {
+      const int column = q * n + support.first;
+      sum.gradient.segment<4>(column) += part.gradient[q] * share;
+      for (int p = q; p < curves; ++p) {
         if (part.matrix(p, q) == 0) continue;
-        sum.matrix.block<4, 4>(p * n + support.first, q * n + support.first) +=
-            part.matrix(p, q) * both;
+        sum.matrix.block<4, 4>(p * n + support.first, column) += part.matrix(p, q) * both;
       }
     }
-  });
-  add_penalty(problem.layout, x, sum);
-  return sum;
+  }
+  add_penalty(closures, sum);
 }
 
 // A damped step within the bounds. An unknown at its bound stays there while the error falls
@@ -282,51 +284,89 @@ Eigen::VectorXd step_from(const Eigen::VectorXd& x, const Bounds& bounds,
         equations.gradient[i] > 0 ? x[i] <= bounds.least[i] : x[i] >= bounds.greatest[i];
     if (!held && equations.matrix(i, i) > 0) free.push_back(i);
   }
-  Eigen::MatrixXd matrix = equations.matrix(free, free);
-  const Eigen::VectorXd gradient = equations.gradient(free);
-  const Eigen::VectorXd scale = matrix.diagonal().cwiseSqrt().cwiseInverse();
-  matrix = scale.asDiagonal() * matrix * scale.asDiagonal();
-  matrix.diagonal().array() += damping;
+  const auto count = static_cast<Eigen::Index>(free.size());
+  const Eigen::VectorXd scale = equations.matrix.diagonal()(free).cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd matrix(count, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const double* const column = &equations.matrix(0, free[static_cast<std::size_t>(j)]);
+    for (Eigen::Index i = j; i < count; ++i) {
+      matrix(i, j) = scale[i] * scale[j] * column[free[static_cast<std::size_t>(i)]];
+    }
+    matrix(j, j) += damping;
+  }
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factors(matrix);  // in place
   Eigen::VectorXd tried = x;
-  tried(free) -= scale.cwiseProduct(matrix.llt().solve(scale.cwiseProduct(gradient)).eval());
+  tried(free) -=
+      scale.cwiseProduct(factors.solve(scale.cwiseProduct(equations.gradient(free)).eval()).eval());
   return tried.cwiseMax(bounds.least).cwiseMin(bounds.greatest);
 }
 
 }  // namespace
 
-Shape shape_at(const ClosureLayout& layout, const Eigen::VectorXd& x, int closure, double cosine) {
-  return clipped_shape(at_view(x, cosine), layout, closure, cosine).shape;
+ClosureCurves subdivided(const ClosureCurves& closures) {
+  ClosureCurves finer = closures;
+  const int from = closures.layout.coefficients;
+  const int to = finer.layout.coefficients = 2 * from - 3;
+  finer.x.resize(finer.layout.unknowns());
+  for (int curve = 0; curve < finer.layout.curves(); ++curve) {
+    finer.x.segment(curve * to, to) =
+        ViewSplines::subdivided(closures.x.segment(curve * from, from));
+  }
+  return finer;
 }
 
-double smooth_error(const ClosureProblem& problem, int stride, const Eigen::VectorXd& x,
-                    double smoothing) {
+ClosureCurves constant_at(const ClosureCurves& closures, double cosine) {
+  return {{closures.layout.specular, 1}, closures.distributions, at_view(closures, cosine).curves};
+}
+
+Shape shape_at(const ClosureCurves& closures, int closure, double cosine) {
+  return clipped_shape(at_view(closures, cosine), closures.layout, closure, cosine).shape;
+}
+
+Eigen::VectorXd light_of_closures(const TargetView& view, const ClosureCurves& closures) {
+  const ClosureLayout& layout = closures.layout;
+  const AtView at = at_view(closures, view.wo.z());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(layout.specular);
+  for (int k = 0; k < layout.specular; ++k) {
+    const Shape shape = clipped_shape(at, layout, k, view.wo.z()).shape;
+    const Microfacet closure = microfacet(closures, k, shape, view.wo);
+    for (const TargetLight& light : view.lights) {
+      sum[k] += light.weight * closure.evaluate(light.wi, light.half);
+    }
+    sum[k] *= at.curves.segment<3>(layout.weight(k, 0)).sum();
+  }
+  return sum;
+}
+
+double smooth_error(const Target& target, const ClosureCurves& closures, double smoothing) {
   double sum = 0;
-  for_each_view(problem, stride,
-                [&](const TargetView& view) { sum += view_error(problem, view, x, smoothing); });
-  return stride * sum + stiffness_penalty(problem.layout, x);
+  for (const TargetView& view : target) sum += view_error(closures, view, smoothing);
+  return sum + stiffness_penalty(closures);
 }
 
-Eigen::VectorXd descend(const ClosureProblem& problem, int stride, Eigen::VectorXd x,
-                        double smoothing, int iterations, const Monitor& monitor) {
-  const Bounds bounds = bounds_of(problem.layout);
-  double error = smooth_error(problem, stride, x, smoothing), damping = 1e-3;
+ClosureCurves descend(const Target& target, ClosureCurves closures, double smoothing,
+                      int iterations, const Monitor& monitor) {
+  const Bounds bounds = bounds_of(closures.layout);
+  double error = smooth_error(target, closures, smoothing), damping = 1e-3;
+  ClosureCurves tried = closures;
+  Equations equations;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     monitor.throw_if_cancelled();
-    const Equations equations = linearise(problem, stride, x, smoothing);
+    linearise(target, closures, smoothing, equations);
     const double before = error;
     for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
-      const Eigen::VectorXd tried = step_from(x, bounds, equations, damping);
-      const double tried_error = smooth_error(problem, stride, tried, smoothing);
+      tried.x = step_from(closures.x, bounds, equations, damping);
+      const double tried_error = smooth_error(target, tried, smoothing);
       const bool better = tried_error < error;
       if (better) {
-        x = tried;
+        closures.x = tried.x;
         error = tried_error;
       }
       damping = std::max(1e-9, damping * (better ? 0.2 : 8));
     }
     if (!(error < before * (1 - 1e-4))) break;
   }
-  return x;
+  return closures;
 }
 
 }  // namespace lobefit

@@ -22,32 +22,49 @@ struct ClosureLayout {
   enum ShapeCurve { mean, spread, bend, shape_curves };
 
   int specular;
+  // Of each curve; with a single one all curves are constants.
+  int coefficients = ViewSplines::coarse;
   int closures() const { return specular + 1; }
   int shape(int closure, int curve) const { return closure * shape_curves + curve; }
   int weight(int closure, int channel) const {
     return specular * shape_curves + closure * 3 + channel;
   }
   int curves() const { return specular * shape_curves + closures() * 3; }
-  int unknowns() const { return curves() * ViewSplines::count; }
+  int unknowns() const { return curves() * coefficients; }
 };
 
-struct ClosureProblem {
-  const Target* target;
+// Closures on the way to their best curves: the distribution of each specular one, and the
+// unknowns.
+struct ClosureCurves {
   ClosureLayout layout;
   std::vector<Distribution> distributions;
+  Eigen::VectorXd x;
+
+  double at(int curve, double cosine) const {
+    return ViewSplines::evaluate(x.segment(curve * layout.coefficients, layout.coefficients),
+                                 cosine);
+  }
 };
 
-// A closure's shape at a view angle, within what Cycles can show.
-Shape shape_at(const ClosureLayout& layout, const Eigen::VectorXd& x, int closure, double cosine);
+// The same closures, their curves of the same course by splines of half the width.
+ClosureCurves subdivided(const ClosureCurves& closures);
 
-// The error of unknowns x over every stride-th view, |r| rounded off below `smoothing` times what
-// is typical there, plus a little for curvature.
-double smooth_error(const ClosureProblem& problem, int stride, const Eigen::VectorXd& x,
-                    double smoothing);
+// The values of all curves at a view angle: the same closures there, with constant curves.
+ClosureCurves constant_at(const ClosureCurves& closures, double cosine);
+
+// A closure's shape at a view angle, within what Cycles can show.
+Shape shape_at(const ClosureCurves& closures, int closure, double cosine);
+
+// What each specular closure adds to the light of a view, in units of the error.
+Eigen::VectorXd light_of_closures(const TargetView& view, const ClosureCurves& closures);
+
+// The error, |r| rounded off below `smoothing` times what is typical there, plus a little for
+// curvature.
+double smooth_error(const Target& target, const ClosureCurves& closures, double smoothing);
 
 // Levenberg and Marquardt's method on smooth_error, within the bounds of what Cycles can show; ends
 // early where nothing is gained. Throws Cancelled.
-Eigen::VectorXd descend(const ClosureProblem& problem, int stride, Eigen::VectorXd x,
-                        double smoothing, int iterations, const Monitor& monitor);
+ClosureCurves descend(const Target& target, ClosureCurves closures, double smoothing,
+                      int iterations, const Monitor& monitor);
 
 }  // namespace lobefit

@@ -3,136 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "closures/closure_problem.h"
+#include "closures/closure_search.h"
 #include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {
-
-using enum ClosureLayout::ShapeCurve;
-using Distributions = std::vector<Distribution>;
-constexpr int n = ViewSplines::count;
-
-struct Candidate {
-  ClosureProblem problem;
-  Eigen::VectorXd x;
-  double error;
-};
-
-Eigen::VectorXd start_at(const ClosureLayout& layout, const std::vector<double>& alphas,
-                         const std::vector<double>& bends) {
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(layout.unknowns());
-  for (int k = 0; k < layout.specular; ++k) {
-    x.segment(layout.shape(k, mean) * n, n)
-        .setConstant(std::log(alphas[static_cast<std::size_t>(k)]));
-    x.segment(layout.shape(k, bend) * n, n).setConstant(bends[static_cast<std::size_t>(k)]);
-  }
-  x.tail(layout.closures() * 3 * n).setConstant(0.1);
-  return x;
-}
-
-constexpr std::array<double, 6> start_alphas = {0.008, 0.025, 0.07, 0.17, 0.4, 0.9};
-
-std::vector<Candidate> starts(const Target& target, int specular) {
-  constexpr auto& alphas = start_alphas;
-  std::vector<Candidate> all;
-  const auto add = [&](const std::vector<double>& chosen, const Distributions& distributions,
-                       std::vector<double> bends = {}) {
-    const ClosureLayout layout{specular};
-    bends.resize(chosen.size(), 0);
-    all.push_back({{&target, layout, distributions}, start_at(layout, chosen, bends), 0});
-  };
-  using enum Distribution;
-  const auto count = alphas.size();
-  if (specular == 0) add({}, {});
-  for (std::size_t i = 0; specular == 1 && i < count; ++i) {
-    for (const auto a : {ggx, beckmann}) add({alphas[i]}, {a});
-  }
-  for (std::size_t i = 0; specular >= 2 && i < count; ++i) {
-    for (std::size_t j = i + 1; j < count; ++j) {
-      if (specular == 2) {
-        add({alphas[i], alphas[j]}, {ggx, ggx});
-        add({alphas[i], alphas[j]}, {beckmann, ggx});
-        add({alphas[i], alphas[j]}, {beckmann, beckmann});
-        // The best two for a lobe that is nearly diffuse are bent apart.
-        for (const double bent : {0.3, 0.8}) {
-          if (alphas[i] < 0.1) continue;
-          add({alphas[i], alphas[j]}, {beckmann, beckmann}, {bent, 0});
-          add({alphas[i], alphas[j]}, {beckmann, beckmann}, {0, bent});
-        }
-      }
-      for (std::size_t k = j + 1; specular == 3 && k < count; ++k) {
-        add({alphas[i], alphas[j], alphas[k]}, {ggx, ggx, ggx});
-      }
-    }
-  }
-  return all;
-}
-
-// A candidate with one closure more, of any width and all but black: so it can only become better.
-std::vector<Candidate> extended(const Candidate& candidate) {
-  const ClosureLayout& from = candidate.problem.layout;
-  const ClosureLayout to{from.specular + 1};
-  std::vector<Candidate> all;
-  for (const double alpha : start_alphas) {
-    for (const auto distribution : {Distribution::ggx, Distribution::beckmann}) {
-      Candidate more{{candidate.problem.target, to, candidate.problem.distributions},
-                     Eigen::VectorXd::Zero(to.unknowns()),
-                     0};
-      more.problem.distributions.push_back(distribution);
-      const auto copy = [&](int to_curve, int from_curve, int curves) {
-        more.x.segment(to_curve * n, curves * n) = candidate.x.segment(from_curve * n, curves * n);
-      };
-      copy(0, 0, from.specular * shape_curves);
-      more.x.segment(to.shape(from.specular, mean) * n, n).setConstant(std::log(alpha));
-      for (int k = 0; k < from.specular; ++k) copy(to.weight(k, 0), from.weight(k, 0), 3);
-      more.x.segment(to.weight(from.specular, 0) * n, 3 * n).setConstant(1e-3);
-      copy(to.weight(to.specular, 0), from.weight(from.specular, 0), 3);
-      all.push_back(std::move(more));
-    }
-  }
-  return all;
-}
-
-// The best closures, their curves still splines; progress runs between two numbers.
-Candidate search(const Target& target, int specular, int threads, Monitor& monitor,
-                 double progress_from, double progress_to) {
-  std::vector<Candidate> found = starts(target, specular);
-  if (specular == most_specular_closures) {
-    const double middle = (progress_from + progress_to) / 2;
-    const auto warm =
-        extended(search(target, specular - 1, threads, monitor, progress_from, middle));
-    found.insert(found.end(), warm.begin(), warm.end());
-    progress_from = middle;
-  }
-  const auto report = [&](const char* stage, double share) {
-    monitor.report(stage, progress_from + share * (progress_to - progress_from));
-  };
-  const auto follow = [&](double smoothing, int iterations, int stride) {
-    parallel_for(static_cast<int>(found.size()), threads, [&](int i) {
-      Candidate& candidate = found[static_cast<std::size_t>(i)];
-      candidate.x = descend(candidate.problem, stride, candidate.x, smoothing, iterations, monitor);
-      candidate.error = smooth_error(candidate.problem, stride, candidate.x, 1e-3);
-    });
-    std::stable_sort(found.begin(), found.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
-  };
-  const auto keep = [&](std::size_t most) {
-    found.resize(std::min(found.size(), most), found.front());
-  };
-  report("Trying closures", 0);
-  follow(0.3, 5, 3);
-  keep(12);
-  report("Trying closures", 0.2);
-  follow(0.1, 10, 2);
-  keep(5);
-  report("Fitting closures", 0.4);
-  follow(0.03, 20, 1);
-  keep(2);
-  report("Fitting closures", 0.7);
-  for (const double smoothing : {0.01, 0.002}) follow(smoothing, 30, 1);
-  return found.front();
-}
 
 // How far curve nodes may be off the curves that were fitted, as a part of what they stand for: so
 // little that the error does not show it.
@@ -149,18 +24,16 @@ struct WeightFactors {
   std::array<ViewCurve, 3> by_channel = {ViewCurve(1), ViewCurve(1), ViewCurve(1)};
 };
 
-ClosureSet to_closures(const ClosureProblem& problem, const Eigen::VectorXd& x, double tolerance,
+ClosureSet to_closures(const ClosureCurves& curves, double tolerance,
                        const WeightFactors& factors) {
-  const ClosureLayout& layout = problem.layout;
+  const ClosureLayout& layout = curves.layout;
   const auto weight_of = [&](int closure, int channel) {
     const int curve = layout.weight(closure, channel);
-    const double size = x.segment(curve * n, n).maxCoeff();
+    const double size =
+        curves.x.segment(curve * layout.coefficients, layout.coefficients).maxCoeff();
     const ViewCurve& factor = factors.by_channel[static_cast<std::size_t>(channel)];
     return ViewCurve::following(
-        [&](double cosine) {
-          return factor(cosine) * ViewSplines::evaluate(x.data() + curve * n, cosine);
-        },
-        tolerance * size);
+        [&](double cosine) { return factor(cosine) * curves.at(curve, cosine); }, tolerance * size);
   };
   ClosureSet result;
   for (int c = 0; c < 3; ++c) {
@@ -171,11 +44,11 @@ ClosureSet to_closures(const ClosureProblem& problem, const Eigen::VectorXd& x, 
       return [&, k, socket](double cosine) {
         const double inside = std::clamp(cosine, 1e-3, 1 - 1e-6);
         const Vector3 wo(std::sqrt(1 - square(inside)), 0, inside);
-        return to_sockets(shape_at(layout, x, k, inside), wo).*socket;
+        return to_sockets(shape_at(curves, k, inside), wo).*socket;
       };
     };
     SpecularClosure closure;
-    closure.distribution = problem.distributions[static_cast<std::size_t>(k)];
+    closure.distribution = curves.distributions[static_cast<std::size_t>(k)];
     // A highlight moved by a part of its width changes as much as one that is wider by that part.
     const double least_roughness = least_over_view(sockets(&ClosureSockets::roughness));
     closure.roughness =
@@ -273,13 +146,13 @@ void leave_out(const Target& target, FittedClosures& fitted) {
 FittedClosures fit_closures(const Target& target, const ClosureFitOptions& options,
                             Monitor& monitor) {
   if (target.empty()) return {};
-  const Candidate best =
-      search(target, options.specular, thread_count(options.threads), monitor, 0, 1);
+  const FoundCurves best =
+      search_curves(target, options.specular, thread_count(options.threads), monitor);
   const double tolerance = curve_tolerance(best.error);
   WeightFactors factors;
-  FittedClosures result{to_closures(best.problem, best.x, tolerance, factors), 0, {}};
+  FittedClosures result{to_closures(best.closures, tolerance, factors), 0, {}};
   factors = energy_factors(look_at(target, result.closures), options.cap_albedo);
-  result.closures = to_closures(best.problem, best.x, tolerance, factors);
+  result.closures = to_closures(best.closures, tolerance, factors);
   result.error = error_of_closures(target, result.closures);
   leave_out(target, result);
   result.by_view = look_at(target, result.closures);

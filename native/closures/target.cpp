@@ -123,6 +123,22 @@ Target sample_target(const Reflectance& f) {
   return target;
 }
 
+Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride) {
+  Target result;
+  std::size_t next = 0;  // counts on from view to view, so that no azimuth is preferred
+  for (std::size_t i = view_stride / 2; i < target.size(); i += view_stride) {
+    const TargetView& from = target[i];
+    TargetView view{from.wo, {}};
+    for (; next < from.lights.size(); next += light_stride) {
+      view.lights.push_back(from.lights[next]);
+      view.lights.back().weight *= static_cast<double>(view_stride * light_stride);
+    }
+    next -= from.lights.size();
+    if (!view.lights.empty()) result.push_back(std::move(view));
+  }
+  return result;
+}
+
 double error_of(const Target& target, const Reflectance& f_times_cosine) {
   double error = 0;
   for (const TargetView& view : target) {

@@ -1,6 +1,7 @@
 // A reflectance as closures and Principled BSDFs are fitted to it.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "reflectance/reflectance.h"
@@ -36,6 +37,9 @@ using Target = std::vector<TargetView>;
 // Samples f (1/sr, without the cosine; NaN where it is not known). Empty for a target that is
 // black or nowhere known.
 Target sample_target(const Reflectance& f);
+
+// The same with every so many-th view and light alone, which stand for the others.
+Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride);
 
 // sum weight |approximation - reflected|, for f cos of an approximation in the same frame.
 double error_of(const Target& target, const Reflectance& f_times_cosine);

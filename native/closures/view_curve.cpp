@@ -61,24 +61,35 @@ ViewCurve ViewCurve::following(const std::function<double(double)>& function, do
   return ViewCurve(std::move(points));
 }
 
-ViewSplines::Support ViewSplines::at(double cosine) {
-  constexpr int intervals = count - 3;
+ViewSplines::Support ViewSplines::at(double cosine, int count) {
+  if (count == 1) return {0, Eigen::Matrix<double, 1, 1>(1)};
+  const int intervals = count - 3;
   const double root = std::sqrt(std::clamp(cosine, 0.0, 1.0));
   const double place = intervals * std::clamp((root - least_root) / (1 - least_root), 0.0, 1.0);
   const int first = std::min(static_cast<int>(place), intervals - 1);
   const double t = place - first, u = 1 - t;
-  return {first,
-          {u * u * u / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * u * u * u - 6 * u * u + 4) / 6,
-           t * t * t / 6}};
+  return {first, Eigen::Vector4d(u * u * u / 6, (3 * t * t * t - 6 * t * t + 4) / 6,
+                                 (3 * u * u * u - 6 * u * u + 4) / 6, t * t * t / 6)};
 }
 
-double ViewSplines::evaluate(const double* coefficients, double cosine) {
-  const Support support = at(cosine);
-  double value = 0;
-  for (int i = 0; i < 4; ++i) {
-    value += support.share[static_cast<std::size_t>(i)] * coefficients[support.first + i];
+double ViewSplines::evaluate(const Coefficients& coefficients, double cosine) {
+  const Support support = at(cosine, static_cast<int>(coefficients.size()));
+  return support.share.dot(coefficients.segment(support.first, support.share.size()));
+}
+
+Eigen::VectorXd ViewSplines::subdivided(const Coefficients& coefficients) {
+  const auto& c = coefficients;
+  Eigen::VectorXd finer(2 * c.size() - 3);
+  for (Eigen::Index i = 0; i < finer.size(); ++i) {
+    const Eigen::Index j = (i + 1) / 2;
+    finer[i] = i % 2 == 0 ? (c[j] + c[j + 1]) / 2 : (c[j - 1] + 6 * c[j] + c[j + 1]) / 8;
   }
-  return value;
+  return finer;
+}
+
+double ViewSplines::centre(int i, int count) {
+  const double share = std::clamp((i - 1) / double(count - 3), 0.0, 1.0);
+  return least_root + share * (1 - least_root);
 }
 
 }  // namespace lobefit

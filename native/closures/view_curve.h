@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <functional>
 #include <vector>
 
@@ -39,20 +38,29 @@ class ViewCurve {
 
 // The cubic B-splines in which curves are fitted: uniform in sqrt(cosine), so that they are finest
 // at grazing angles and smooth at normal incidence; constant where sqrt(cosine) is below
-// least_root. Their coefficients have the size of the curve, and not less than 0 keep it so.
+// least_root. Their coefficients have the size of the curve, and not less than 0 keep it so. A
+// single coefficient is a constant.
 class ViewSplines {
  public:
-  static constexpr int count = 13;
   static constexpr double least_root = 0.15;
+  // As many as a search has until it knows its way.
+  static constexpr int coarse = 13;
 
-  // The four splines that are not 0 at a view angle.
+  // The splines that are not 0 at a view angle, of so many, and their values, of the sum 1.
   struct Support {
     int first;
-    std::array<double, 4> share;  // their values, of the sum 1
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1> share;
   };
-  static Support at(double cosine);
+  static Support at(double cosine, int count);
 
-  static double evaluate(const double* coefficients, double cosine);
+  using Coefficients = Eigen::Ref<const Eigen::VectorXd>;
+  static double evaluate(const Coefficients& coefficients, double cosine);
+
+  // The same curve by splines of half the width, 2 n - 3 for n: Chaikin's and Catmull and Clark's
+  // subdivision of cubic splines.
+  static Eigen::VectorXd subdivided(const Coefficients& coefficients);
+  // The sqrt(cosine) that coefficient i of so many stands for: the middle of its spline.
+  static double centre(int i, int count);
 };
 
 }  // namespace lobefit

@@ -1,0 +1,16 @@
+// The search for the curves of the best few closures.
+#pragma once
+
+#include "closures/closure_problem.h"
+
+namespace lobefit {
+
+// The diffuse closure and so many specular ones, their curves still splines, that come nearest to
+// the target; the same for any number of threads. Reports progress from 0 to 1. Throws Cancelled.
+struct FoundCurves {
+  ClosureCurves closures;
+  double error;
+};
+FoundCurves search_curves(const Target& target, int specular, int threads, Monitor& monitor);
+
+}  // namespace lobefit

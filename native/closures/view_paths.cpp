@@ -1,0 +1,214 @@
+#include "closures/view_paths.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "measurement/parallel.h"
+
+namespace lobefit {
+namespace {
+
+// What a jump counts against the errors of single views: the ways differ, and which is best shows
+// when curves follow them.
+constexpr std::array<double, 3> reluctances = {0.05, 0.2, 0.8};
+constexpr double smoothing = 0.03;
+constexpr int iterations = 12;
+// Optima of a view that are told apart, and what part of the light has to be off for that.
+constexpr int most_optima = 6;
+constexpr double alike = 0.02;
+
+double root_of(const Target& view) { return std::sqrt(view.front().wo.z()); }
+
+}  // namespace
+
+ViewPaths::ViewPaths(const Target& views, const std::vector<ClosureCurves>& starts, int threads,
+                     const Monitor& monitor)
+    : threads_(threads) {
+  for (const TargetView& view : views) views_.push_back({view});
+  std::vector<Optima> found(starts.size(), Optima(views_.size()));
+  parallel_for(static_cast<int>(starts.size() * views_.size()), threads, [&](int job) {
+    const std::size_t start = static_cast<std::size_t>(job) / views_.size();
+    const std::size_t view = static_cast<std::size_t>(job) % views_.size();
+    found[start][view] = optimum(view, starts[start], monitor);
+  });
+  for (Optima& of_start : found) {
+    const auto& choice = of_start.front().closures.distributions;
+    auto known = std::find_if(by_choice_.begin(), by_choice_.end(), [&](const OptimaByView& other) {
+      return other.front().front().closures.distributions == choice;
+    });
+    if (known == by_choice_.end()) known = by_choice_.emplace(known, views_.size());
+    for (std::size_t view = 0; view < views_.size(); ++view) {
+      (*known)[view].push_back(std::move(of_start[view]));
+    }
+  }
+  for (OptimaByView& optima : by_choice_) {
+    for (Optima& of_view : optima) of_view = distinct(std::move(of_view));
+  }
+}
+
+std::vector<ClosureCurves> ViewPaths::paths() const {
+  std::vector<ClosureCurves> all;
+  for (const OptimaByView& optima : by_choice_) {
+    for (ClosureCurves& closures : ways(optima)) all.push_back(std::move(closures));
+  }
+  return all;
+}
+
+std::vector<ClosureCurves> ViewPaths::detours(const ClosureCurves& closures,
+                                              const Monitor& monitor) const {
+  Optima own(views_.size());
+  parallel_for(static_cast<int>(views_.size()), threads_, [&](int job) {
+    const auto view = static_cast<std::size_t>(job);
+    own[view] = optimum(view, constant_at(closures, views_[view].front().wo.z()), monitor);
+  });
+  const auto known =
+      std::find_if(by_choice_.begin(), by_choice_.end(), [&](const OptimaByView& optima) {
+        return optima.front().front().closures.distributions == closures.distributions;
+      });
+  OptimaByView optima = known == by_choice_.end() ? OptimaByView(views_.size()) : *known;
+  for (std::size_t view = 0; view < views_.size(); ++view) {
+    optima[view].insert(optima[view].begin(), std::move(own[view]));
+  }
+  return ways(optima);
+}
+
+ViewPaths::Optimum ViewPaths::optimum(std::size_t view, const ClosureCurves& start,
+                                      const Monitor& monitor) const {
+  const Target& target = views_[view];
+  const ClosureCurves closures = descend(target, start, smoothing, iterations, monitor);
+  Optimum result{closures,
+                 smooth_error(target, closures, 1e-3),
+                 light_of_closures(target.front(), closures),
+                 {}};
+  for (int k = 0; k < closures.layout.specular; ++k) {
+    result.shapes.push_back(shape_at(closures, k, target.front().wo.z()));
+  }
+  return result;
+}
+
+// What closures are off half-way between two optima: about as large a part of their light as the
+// logarithms of their widths differ by and as they are moved in their own width.
+double ViewPaths::jump(const Optimum& from, const Optimum& to) {
+  double sum = 0;
+  for (std::size_t k = 0; k < from.shapes.size(); ++k) {
+    const Shape &a = from.shapes[k], &b = to.shapes[k];
+    const double width = std::exp((a.log_alpha_x + b.log_alpha_x) / 2);
+    const double off = std::abs(a.log_alpha_x - b.log_alpha_x) +
+                       std::abs(a.log_alpha_y - b.log_alpha_y) + std::abs(a.tilt - b.tilt) / width;
+    const auto closure = static_cast<Eigen::Index>(k);
+    sum += std::sqrt(from.light[closure] * to.light[closure]) * std::min(off, 1.0);
+  }
+  return sum;
+}
+
+// The best of the optima that are not alike, in every order.
+ViewPaths::Optima ViewPaths::distinct(Optima optima) {
+  std::stable_sort(optima.begin(), optima.end(),
+                   [](const Optimum& a, const Optimum& b) { return a.error < b.error; });
+  Optima kept;
+  int count = 0;
+  for (const Optimum& next : optima) {
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const Optimum& other) {
+      return jump(other, next) < alike * next.light.sum();
+    });
+    if (known) continue;
+    for (Optimum& ordered : in_every_order(next)) kept.push_back(std::move(ordered));
+    if (++count == most_optima) break;
+  }
+  return kept;
+}
+
+// Closures of one distribution can take each other's places.
+ViewPaths::Optima ViewPaths::in_every_order(const Optimum& optimum) {
+  const ClosureLayout& layout = optimum.closures.layout;
+  const auto& distributions = optimum.closures.distributions;
+  std::vector<std::size_t> order(distributions.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  Optima all;
+  do {
+    const bool fits = std::equal(
+        order.begin(), order.end(), distributions.begin(),
+        [&](std::size_t k, Distribution distribution) { return distributions[k] == distribution; });
+    if (!fits) continue;
+    Optimum ordered = optimum;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      const int to = static_cast<int>(k), from = static_cast<int>(order[k]);
+      const auto move = [&](int to_curve, int from_curve) {
+        ordered.closures.x.segment<3>(to_curve) = optimum.closures.x.segment<3>(from_curve);
+      };
+      move(layout.shape(to, 0), layout.shape(from, 0));
+      move(layout.weight(to, 0), layout.weight(from, 0));
+      ordered.light[to] = optimum.light[from];
+      ordered.shapes[k] = optimum.shapes[order[k]];
+    }
+    all.push_back(std::move(ordered));
+  } while (std::next_permutation(order.begin(), order.end()));
+  return all;
+}
+
+std::vector<ClosureCurves> ViewPaths::ways(const OptimaByView& optima) const {
+  std::vector<Path> found;
+  for (const double reluctance : reluctances) {
+    Path path = way(optima, reluctance);
+    if (std::find(found.begin(), found.end(), path) == found.end()) found.push_back(path);
+  }
+  std::vector<ClosureCurves> result;
+  for (const Path& path : found) result.push_back(through(path));
+  return result;
+}
+
+ViewPaths::Path ViewPaths::way(const OptimaByView& optima, double reluctance) const {
+  // The least cost of a way to each optimum of a view, and the optimum before it on that way.
+  std::vector<std::vector<double>> cost(optima.size());
+  std::vector<std::vector<std::size_t>> before(optima.size());
+  for (std::size_t view = 0; view < optima.size(); ++view) {
+    for (const Optimum& here : optima[view]) {
+      double least = view == 0 ? 0 : std::numeric_limits<double>::infinity();
+      std::size_t from = 0;
+      for (std::size_t i = 0; view > 0 && i < cost[view - 1].size(); ++i) {
+        const double by_it = cost[view - 1][i] + reluctance * jump(optima[view - 1][i], here);
+        if (by_it < least) {
+          least = by_it;
+          from = i;
+        }
+      }
+      cost[view].push_back(least + here.error);
+      before[view].push_back(from);
+    }
+  }
+  const std::vector<double>& last = cost.back();
+  auto at = static_cast<std::size_t>(std::min_element(last.begin(), last.end()) - last.begin());
+  Path path(optima.size());
+  for (std::size_t view = optima.size(); view-- > 0;) {
+    path[view] = &optima[view][at];
+    at = before[view][at];
+  }
+  return path;
+}
+
+ClosureCurves ViewPaths::through(const Path& path) const {
+  ClosureCurves closures{
+      {path.front()->closures.layout.specular}, path.front()->closures.distributions, {}};
+  const ClosureLayout& layout = closures.layout;
+  closures.x.resize(layout.unknowns());
+  for (int i = 0; i < layout.coefficients; ++i) {
+    // Views ascend. Between two of them values go straight from one to the other.
+    const double root = ViewSplines::centre(i, layout.coefficients);
+    std::size_t next = 0;
+    while (next + 1 < path.size() && root_of(views_[next]) < root) ++next;
+    const std::size_t last = next == 0 ? 0 : next - 1;
+    const double gap = root_of(views_[next]) - root_of(views_[last]);
+    const double share = gap > 0 ? std::clamp((root - root_of(views_[last])) / gap, 0.0, 1.0) : 0.0;
+    const Eigen::VectorXd values =
+        (1 - share) * path[last]->closures.x + share * path[next]->closures.x;
+    for (int curve = 0; curve < layout.curves(); ++curve) {
+      closures.x[curve * layout.coefficients + i] = values[curve];
+    }
+  }
+  return closures;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,52 @@
+// Ways through the best closures of single view angles: starts for curves that fit all of them.
+#pragma once
+
+#include <vector>
+
+#include "closures/closure_problem.h"
+
+namespace lobefit {
+
+// At a single view angle closures are fitted in an instant, from many starts, to many local optima.
+// Curves that are fitted to all angles at once get stuck where the best closures change their
+// places from one angle to the next. So the ways from optimum to optimum are found whose errors,
+// together with how much they jump, are least (Viterbi's algorithm), and curves start from there.
+class ViewPaths {
+ public:
+  // Fits closures, all of one number, to each view by itself from each of the starts, which have
+  // constant curves. Throws Cancelled.
+  ViewPaths(const Target& views, const std::vector<ClosureCurves>& starts, int threads,
+            const Monitor& monitor);
+
+  // The best ways, for each choice of distributions and each reluctance to jump.
+  std::vector<ClosureCurves> paths() const;
+
+  // The best ways that may also follow the optima next to these closures.
+  std::vector<ClosureCurves> detours(const ClosureCurves& closures, const Monitor& monitor) const;
+
+ private:
+  // Closures at one view, with what they add to its light and what they look like there.
+  struct Optimum {
+    ClosureCurves closures;
+    double error;
+    Eigen::VectorXd light;
+    std::vector<Shape> shapes;
+  };
+  using Optima = std::vector<Optimum>;
+  using OptimaByView = std::vector<Optima>;
+  using Path = std::vector<const Optimum*>;  // one of each view
+
+  Optimum optimum(std::size_t view, const ClosureCurves& start, const Monitor& monitor) const;
+  std::vector<ClosureCurves> ways(const OptimaByView& optima) const;
+  Path way(const OptimaByView& optima, double reluctance) const;
+  ClosureCurves through(const Path& path) const;
+  static Optima distinct(Optima optima);
+  static Optima in_every_order(const Optimum& optimum);
+  static double jump(const Optimum& from, const Optimum& to);
+
+  std::vector<Target> views_;            // each of one view
+  std::vector<OptimaByView> by_choice_;  // of distributions
+  int threads_;
+};
+
+}  // namespace lobefit
