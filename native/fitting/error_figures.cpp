@@ -91,7 +91,8 @@ class RowFiller {
   Row cos_phi_;
 };
 
-Misfits misfits_of_row(const Measurement& measurement, const RowFiller& fill, int h) {
+// `share` is what a bin counts; of 1 / bins, so that no sum is larger than the largest value.
+Misfits misfits_of_row(const Measurement& measurement, const RowFiller& fill, int h, double share) {
   static const double cos_80 = std::cos(radians(80));
   Misfits sums;
   for (int d = 0; d < Measurement::theta_d_bins; ++d) {
@@ -103,9 +104,9 @@ Misfits misfits_of_row(const Measurement& measurement, const RowFiller& fill, in
         const Rgb measured(values[bin], values[bin + Measurement::bin_count],
                            values[bin + 2 * Measurement::bin_count]);
         const Rgb error = (Rgb(row.model[0][p], row.model[1][p], row.model[2][p]) - measured).abs();
-        sums.plain.add(1, error, measured);
-        if (row.lower_cosine[p] > cos_80) sums.within_80.add(1, error, measured);
-        sums.cosine.add(row.weight[p], error, measured);
+        sums.plain.add(share, error, measured);
+        if (row.lower_cosine[p] > cos_80) sums.within_80.add(share, error, measured);
+        sums.cosine.add(share * row.weight[p], error, measured);
       }
     }
   }
@@ -118,13 +119,13 @@ ErrorFigures error_figures(const Measurement& measurement, const Parameters& par
                            int threads) {
   std::vector<Misfits> rows(Measurement::theta_h_bins);
   const RowFiller fill(parameters);
+  const double share = 1.0 / std::max(measurement.bins().valid, 1);
   parallel_for(Measurement::theta_h_bins, threads, [&](int h) {
-    rows[static_cast<std::size_t>(h)] = misfits_of_row(measurement, fill, h);
+    rows[static_cast<std::size_t>(h)] = misfits_of_row(measurement, fill, h, share);
   });
   Misfits total;
   for (const Misfits& row : rows) total.add(row);
-  const double bins = std::max(measurement.bins().valid, 1);
-  return {{total.plain.error.sum() / (3 * bins), total.plain.error / bins},
+  return {{total.plain.error.mean(), total.plain.error},
           total.plain.relative(),
           total.within_80.relative(),
           total.cosine.relative()};

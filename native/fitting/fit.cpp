@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 #include "fitting/minimise.h"
@@ -11,6 +12,7 @@
 #include "fitting/samples.h"
 #include "fitting/scan.h"
 #include "fitting/variables.h"
+#include "measurement/input_error.h"
 #include "measurement/parallel.h"
 
 namespace lobefit {
@@ -49,7 +51,14 @@ class Fitter {
         variables_(options.kind, options.fresnel, options.separate_channels),
         all_(all_samples(measurement, options)),
         some_(subsample(all_, finalist_samples, threads_)),
-        few_(every_nth(some_, finalists_to_candidates)) {}
+        few_(every_nth(some_, finalists_to_candidates)) {
+    if (valid_samples() == 0) {
+      std::ostringstream message;
+      message << "expected reflectances within " << options.max_angle_degrees
+              << " degrees of the normal, found no valid bin.";
+      throw InputError(message.str());
+    }
+  }
 
   Fit run() {
     const Stopwatch start_watch;
@@ -174,8 +183,19 @@ class Fitter {
     fit_.certainty.spread = best > 0 ? (worst - best) / best : 0;
   }
 
+  std::ptrdiff_t valid_samples() const {
+    return std::count_if(all_.weight.begin(), all_.weight.end(), [](float w) { return w > 0; });
+  }
+
   void name_degenerate(const VectorXd& x) {
     const auto warn = [&](const char* sentence) { fit_.warnings.emplace_back(sentence); };
+    if (valid_samples() < variables_.count()) {
+      warn("The measurement has fewer valid bins than the model has parameters.");
+    }
+    constexpr double black = 0.999;  // black itself has the relative error 1
+    if (std::min(fit_.errors.relative_l1.pooled, fit_.errors.relative_l1_cosine.pooled) > black) {
+      warn("The fit is no closer to the measurement than black is.");
+    }
     const bool no_specular = !(x.segment<3>(Variables::specular).maxCoeff() > 0);
     if (no_specular) {
       warn(

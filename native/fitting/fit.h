@@ -41,7 +41,8 @@ struct Fit {
 
 // Starts come from the data (scan_shapes). Schedule::stages then runs the paper's three stages on
 // all bins from the best of them; Schedule::polish runs stages and joint polish from each of them
-// on a subsample, and polishes the best on all bins. Throws Cancelled.
+// on a subsample, and polishes the best on all bins. Throws Cancelled, and InputError (of a
+// sentence that does not name the measurement) where no valid bin is within the angle asked for.
 Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor);
 
 }  // namespace lobefit

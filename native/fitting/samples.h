@@ -41,7 +41,7 @@ using SampleColumn = std::vector<T, UntouchedMemory<T>>;
 //
 // Samples of one theta_d stand together in a run, because the Fresnel reflectance is the same for
 // all of them; a run is padded with samples of weight 0 to a multiple of `padding`. Values are in
-// units of the median reflectance.
+// units of the median reflectance, or of the mean where the median is next to nothing.
 struct Samples {
   static constexpr std::size_t padding = 4;
   struct Run {
@@ -55,7 +55,7 @@ struct Samples {
   SampleColumn<float> weight;  // of each of the two measured values
   // measured[channel][half]: f, or log(f + log_offset) for Norm::log_l2.
   std::array<std::array<SampleColumn<float>, 2>, 3> measured;
-  double unit = 1;  // the median reflectance, in 1/sr
+  double unit = 1;  // in 1/sr
 
   std::size_t size() const { return weight.size(); }
 };

@@ -212,28 +212,5 @@ TEST(Fit, NamesAnOutcomeWithoutSpecularPart) {
   EXPECT_FALSE(fit.warnings.empty());
 }
 
-TEST(Fit, OfExtremeTablesIsFinite) {
-  const auto finite = [](const Fit& fit) {
-    const Parameters& p = fit.parameters;
-    return p.diffuse.isFinite().all() && p.specular.isFinite().all() &&
-           p.exponent.isFinite().all() && std::isfinite(p.ior.value_or(1)) &&
-           std::isfinite(fit.errors.relative_l1.pooled);
-  };
-  const auto plane_of = [](auto value) {
-    std::vector<double> planes(3 * static_cast<std::size_t>(Measurement::bin_count));
-    for (std::size_t i = 0; i < planes.size(); ++i) planes[i] = value(i);
-    return Measurement(planes);
-  };
-  EXPECT_TRUE(finite(fit_of(plane_of([](std::size_t) { return 0.0; }), {})));
-  EXPECT_TRUE(finite(fit_of(plane_of([](std::size_t i) { return i % 100000 ? 0.0 : 5.0; }), {})));
-  EXPECT_TRUE(finite(fit_of(plane_of([](std::size_t i) { return i % 9999 ? -1.0 : 5.0; }), {})));
-  const Measurement nickel = sample_measurement("nickel");
-  std::vector<double> tiny(nickel.planes().begin(), nickel.planes().end());
-  for (double& value : tiny) value *= 1e-30;
-  const Fit fit = fit_of(Measurement(tiny), {});
-  EXPECT_TRUE(finite(fit));
-  EXPECT_LT(fit.errors.relative_l1.pooled, 0.5);
-}
-
 }  // namespace
 }  // namespace lobefit
