@@ -172,7 +172,7 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--uncertainty",
         action="store_true",
-        help="also how well the data determine the parameters (up to 3 times the time of a fit more)",
+        help="also how well the data determine the parameters (up to 3 more times as long)",
     )
     _add_json(command)
 
