@@ -71,6 +71,10 @@ class Fitter {
                                                              : run_polish(std::move(starts));
     fit_.fit_seconds = fit_watch.seconds();
     fit_.parameters = variables_.to_parameters(x, all_.unit);
+    if (options_.uncertainty) {
+      monitor_.report("Fitting without each part of the data", 0.85);
+      fit_.uncertainty = jackknife(some_, variables_, options_.norm, x, threads_, monitor_);
+    }
     monitor_.report("Measuring the error", 0.95);
     fit_.errors = error_figures(measurement_, fit_.parameters, threads_);
     name_degenerate(x);

@@ -1,10 +1,12 @@
 // The fit of a model to a measurement.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fitting/error_figures.h"
+#include "fitting/jackknife.h"
 #include "fitting/monitor.h"
 #include "fitting/options.h"
 #include "measurement/measurement.h"
@@ -36,7 +38,8 @@ struct Fit {
   double start_seconds = 0, fit_seconds = 0;
   bool converged = false;
   Certainty certainty;
-  std::vector<std::string> warnings;  // what is degenerate in the result, a sentence each
+  std::optional<Uncertainty> uncertainty;  // where the options ask for it
+  std::vector<std::string> warnings;       // what is degenerate in the result, a sentence each
 };
 
 // Starts come from the data (scan_shapes). Schedule::stages then runs the paper's three stages on

@@ -27,6 +27,8 @@ struct FitOptions {
   double max_angle_degrees = 90;
   // One exponent a channel instead of a shared one.
   bool separate_channels = false;
+  // Also finds how well the data determine the parameters (jackknife.h).
+  bool uncertainty = false;
   // 0 takes as many as the machine has. The result does not depend on it.
   int threads = 0;
 };

@@ -55,6 +55,23 @@ std::vector<int> Variables::shape_and_specular() const {
   return indices;
 }
 
+std::vector<std::string> Variables::names() const {
+  std::vector<std::string> names;
+  const auto add_channels = [&](const std::string& name) {
+    for (const char* channel : {" red", " green", " blue"}) names.push_back(name + channel);
+  };
+  add_channels("diffuse");
+  add_channels("specular");
+  if (exponents_ == 3) {
+    add_channels("exponent");
+  } else {
+    names.emplace_back("exponent");
+  }
+  if (interpolation_ >= 0) names.emplace_back("interpolation");
+  if (log_excess_ior_ >= 0) names.emplace_back("ior");
+  return names;
+}
+
 Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const {
   Parameters parameters;
   parameters.kind = kind_;

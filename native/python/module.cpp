@@ -180,6 +180,55 @@ py::dict to_dict(const ErrorFigures& errors) {
                   "relative_l1_cosine"_a = to_dict(errors.relative_l1_cosine));
 }
 
+// The ends of `count` steps from 0 to 90 deg, the first one's beginning too; `power` 2 makes them
+// grow as the bins of theta_h do.
+std::vector<double> angles_between(int count, int power) {
+  std::vector<double> ends;
+  for (int i = 0; i <= count; ++i) ends.push_back(90 * std::pow(double(i) / count, power));
+  return ends;
+}
+
+template <typename Parts>
+std::pair<py::list, py::list> columns_of(const Parts& parts) {
+  py::list misfit, measured;
+  for (const ErrorByAngle::Part& part : parts) {
+    misfit.append(part.misfit);
+    measured.append(part.measured);
+  }
+  return {misfit, measured};
+}
+
+py::dict to_dict(const ErrorByAngle& errors) {
+  using namespace py::literals;
+  py::list misfit, measured;
+  for (const auto& row : errors.half_difference) {
+    const auto [row_misfit, row_measured] = columns_of(row);
+    misfit.append(row_misfit);
+    measured.append(row_measured);
+  }
+  const auto [view_misfit, view_measured] = columns_of(errors.view);
+  return py::dict(
+      "half_difference"_a = py::dict("theta_h"_a = angles_between(ErrorByAngle::cells, 2),
+                                     "theta_d"_a = angles_between(ErrorByAngle::cells, 1),
+                                     "misfit"_a = misfit, "measured"_a = measured),
+      "view"_a = py::dict("view_angle"_a = angles_between(ErrorByAngle::views, 1),
+                          "misfit"_a = view_misfit, "measured"_a = view_measured));
+}
+
+py::dict to_dict(const Uncertainty& uncertainty, const FitOptions& options) {
+  using namespace py::literals;
+  py::list correlation;
+  for (const auto& row : uncertainty.correlation.rowwise()) {
+    correlation.append(std::vector<double>(row.begin(), row.end()));
+  }
+  return py::dict(
+      "confidence"_a = Uncertainty::confidence, "blocks"_a = uncertainty.blocks,
+      "seconds"_a = uncertainty.seconds, "low"_a = to_dict(uncertainty.low),
+      "high"_a = to_dict(uncertainty.high), "undetermined"_a = uncertainty.undetermined,
+      "variables"_a = Variables(options.kind, options.fresnel, options.separate_channels).names(),
+      "correlation"_a = correlation);
+}
+
 py::list to_list(const std::vector<Stage>& stages) {
   using namespace py::literals;
   py::list list;
@@ -202,7 +251,10 @@ py::dict to_dict(const RecordContents& contents, const FitOptions& options) {
   const Certainty& certainty = fit.certainty;
   return py::dict(
       "model"_a = std::string(name_of(options.kind)), "parameters"_a = to_dict(fit.parameters),
-      "error"_a = to_dict(fit.errors), "schedule"_a = std::string(name_of(options.schedule)),
+      "error"_a = to_dict(fit.errors), "error_by_angle"_a = to_dict(fit.errors.by_angle),
+      "uncertainty"_a =
+          fit.uncertainty ? py::object(to_dict(*fit.uncertainty, options)) : py::object(py::none()),
+      "schedule"_a = std::string(name_of(options.schedule)),
       "norm"_a = std::string(name_of(options.norm)),
       "channels"_a = options.separate_channels ? "separate" : "shared",
       "max_angle"_a = options.max_angle_degrees, "stages"_a = to_list(fit.stages),
@@ -332,7 +384,7 @@ struct PythonJob {
 std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string& model,
                                      bool fresnel, const std::string& schedule,
                                      const std::string& norm, double max_angle,
-                                     const std::string& channels, int threads) {
+                                     const std::string& channels, bool uncertainty, int threads) {
   FitOptions options;
   options.kind = model_named(model);
   options.fresnel = fresnel;
@@ -347,6 +399,7 @@ std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string
     throw InputError("channels: expected shared or separate, found '" + channels + "'.");
   }
   options.separate_channels = channels == "separate";
+  options.uncertainty = uncertainty;
   if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
   options.threads = threads;
   if (py::isinstance<Measurement>(source)) {
@@ -430,7 +483,8 @@ void bind_jobs(py::module_& module) {
   py::class_<PythonJob> fit(module, "FitJob", "A fit that runs in a thread of its own.");
   fit.def(py::init(&start_job), py::arg("source"), py::arg("model") = "interpolated",
           py::arg("fresnel") = true, py::arg("schedule") = "polish", py::arg("norm") = "l1",
-          py::arg("max_angle") = 90.0, py::arg("channels") = "shared", py::arg("threads") = 0,
+          py::arg("max_angle") = 90.0, py::arg("channels") = "shared",
+          py::arg("uncertainty") = false, py::arg("threads") = 0,
           "Starts at once; source is a path or a Measurement.");
   bind_job_methods(fit, [](PythonJob& p) -> RecordJob& { return p.job; });
   fit.def(

@@ -178,6 +178,43 @@ TEST(Fit, ReportsTheErrorThatItMinimised) {
   EXPECT_NEAR(fit.stages.back().error, fit.errors.l1.pooled, 1e-6 * fit.errors.l1.pooled);
 }
 
+TEST(Fit, TellsAtWhichAnglesTheErrorStands) {
+  const ErrorFigures errors = fit_of(sample_measurement("nickel"), {}).errors;
+  double misfit = 0, measured = 0, seen_misfit = 0, seen = 0;
+  for (const auto& row : errors.by_angle.half_difference) {
+    for (const ErrorByAngle::Part& part : row) {
+      misfit += part.misfit;
+      measured += part.measured;
+    }
+  }
+  for (const ErrorByAngle::Part& part : errors.by_angle.view) {
+    seen_misfit += part.misfit;
+    seen += part.measured;
+  }
+  // Sums of a million terms in another order.
+  EXPECT_NEAR(measured, 1, 1e-9);
+  EXPECT_NEAR(seen, 1, 1e-9);
+  EXPECT_NEAR(misfit, errors.relative_l1.pooled, 1e-9);
+  EXPECT_NEAR(seen_misfit, errors.relative_l1_cosine.pooled, 1e-9);
+}
+
+// A table that is wrong only where light or viewer stand at 62 to 63 degrees has its error in the
+// step of 60 to 65 degrees and in those of the other direction, which are spread out.
+TEST(Fit, FindsTheViewAngleOfAnError) {
+  Parameters flat;
+  flat.diffuse = {0.5, 0.4, 0.3};
+  const Measurement wrong = Measurement::tabulate([&](const HalfDifference& at) {
+    const Directions to = to_directions(at);
+    const double view = degrees(std::acos(to.wo.z()));
+    return Rgb(evaluate_model(flat, at) * (view > 62 && view < 63 ? 2 : 1));
+  });
+  const auto views = error_figures(wrong, flat, 1).by_angle.view;
+  const auto most = std::max_element(views.begin(), views.end(), [](const auto& a, const auto& b) {
+    return a.misfit / a.measured < b.misfit / b.measured;
+  });
+  EXPECT_EQ(most - views.begin(), 12);
+}
+
 TEST(Fit, OfTheCosineNormHasTheLeastCosineError) {
   const Measurement sample = sample_measurement("nickel");
   FitOptions options;

@@ -99,6 +99,26 @@ def test_unknown_options_are_named(table, option, value):
         lobefit.fit(table, **{option: value})
 
 
+def test_the_record_tells_where_the_error_stands(recovered):
+    parts = recovered.error_by_angle["half_difference"]
+    # Five digits of each of the 225 parts are kept.
+    assert np.sum(parts["measured"]) == pytest.approx(1, rel=1e-4)
+    whole = recovered.error["relative_l1"]["pooled"]
+    assert np.sum(parts["misfit"]) == pytest.approx(whole, rel=1e-4)
+    seen = recovered.error["relative_l1_cosine"]["pooled"]
+    assert sum(recovered.error_by_angle["view"]["misfit"]) == pytest.approx(seen, rel=1e-4)
+
+
+def test_uncertainty_is_found_where_it_is_asked_for(recovered, table, truth):
+    assert recovered.uncertainty is None
+    record = lobefit.fit(table, uncertainty=True)
+    assert record.uncertainty["blocks"] >= 20
+    assert record.uncertainty["undetermined"] == []
+    low, high = record.intervals["exponent"]
+    assert low <= record.parameters["exponent"] <= high < 1.1 * truth["exponent"]
+    assert record.parameters == recovered.parameters
+
+
 @pytest.fixture(scope="module")
 def approximated(table):
     """The record of a table with one closure, without a file behind it."""

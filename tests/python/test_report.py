@@ -7,7 +7,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from lobefit import _native, pictures, read, report
+from lobefit import _native, angles, fit, pictures, read, report
+from lobefit.heat_map import color_of, heat_map
 from lobefit.pictures import Picture
 from lobefit.plot import Line, plot
 
@@ -59,6 +60,34 @@ def test_a_plot_parts_its_line_where_nothing_is_known():
 
 def test_a_plot_of_nothing_is_empty():
     assert plot([Line("one", [0, 1], [None, None], "#000")], "x", "y") == ""
+
+
+def test_the_page_shows_curves_maps_and_intervals(table, tmp_path):
+    record = fit(table, uncertainty=True)
+    record.uncertainty["undetermined"] = ["ior"]
+    page = report.page([record], {}, [], {})
+    parser = Balance()
+    parser.feed(page)
+    assert parser.open == []
+    for incidence in angles.INCIDENCES:
+        assert f"f in 1/sr over view angle in degrees, light at {incidence:g}" in page
+    assert 'aria-label="relative error over theta_d and theta_h"' in page
+    assert 'aria-label="relative L1 over view angle in degrees"' in page
+    assert re.search(r'class="open">1\.\d+ to 1\.\d+ \?<', page)
+
+
+def test_a_logarithmic_plot_leaves_out_what_has_no_logarithm():
+    svg = plot([Line("one", [0, 1, 2, 3], [0.01, 0.0, 10.0, 100.0], "#000")], "x", "y", log=True)
+    (path,) = re.findall(r'class="curve" d="([^"]*)"', svg)
+    assert path.count("M") == 2 and path.count("L") == 1
+    ticks = re.findall(r'class="end">([^<]*)<', svg)
+    assert ticks == ["0.01", "0.1", "1", "10", "100"]
+
+
+def test_a_heat_map_leaves_out_cells_without_an_error():
+    drawn = heat_map([0, 45, 90], [0, 90], [[0.1], [None]], lambda row, column: f"{row} {column}")
+    assert re.findall(r"<title>([^<]*)</title>", drawn) == ["0 0"]
+    assert color_of(0.1) in drawn and color_of(5.0) == color_of(1.0) != color_of(0.5)
 
 
 WAYS = [

@@ -38,6 +38,7 @@ class FitJob:
         norm: str = "l1",
         max_angle: float = 90.0,
         channels: str = "shared",
+        uncertainty: bool = False,
         threads: int = 0,
     ) -> None: ...
     @property

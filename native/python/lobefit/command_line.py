@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -28,7 +29,7 @@ from lobefit.inputs import (
     spread,
 )
 from lobefit.origin import origin_of, write_samples
-from lobefit.record import MODELS, VISUAL_NORM, Record
+from lobefit.record import MODELS, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
@@ -138,8 +139,8 @@ def _add_sample(commands: Any) -> None:
 
 
 def _add_info(commands: Any) -> None:
-    command = _add(commands, _info, "say what measured files hold")
-    command.add_argument("files", metavar="FILE", nargs="+")
+    command = _add(commands, _info, "say what measured files or records hold")
+    command.add_argument("files", metavar="FILE|RECORD.json", nargs="+")
     _add_json(command)
 
 
@@ -167,6 +168,11 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
         "--again",
         action="store_true",
         help="also what a folder already holds, of the same settings",
+    )
+    command.add_argument(
+        "--uncertainty",
+        action="store_true",
+        help="also how well the data determine the parameters (up to 3 more times as long)",
     )
     _add_json(command)
 
@@ -284,6 +290,7 @@ def _add_report(commands: Any) -> None:
     command = _add(commands, _report, "write a page of pictures, errors and run times")
     command.add_argument("files", metavar="FILE|RECORD.json|DIR", nargs="+")
     _add_fit_options(command, model="all", norm=VISUAL_NORM)
+    command.set_defaults(uncertainty=True)
     command.add_argument("-o", dest="output", required=True, metavar="DIR")
 
 
@@ -317,6 +324,9 @@ def _sample(options: argparse.Namespace) -> int:
 
 def _info(options: argparse.Namespace) -> int:
     def tell(path: Path) -> None:
+        if path.suffix.lower() == RECORD_SUFFIX:
+            _tell_of_record(Record.load(path), path, options.json)
+            return
         measurement = read(path)
         bins, origin = dict(measurement.bins), origin_of(path)
         warnings = _bin_warnings(bins)
@@ -333,6 +343,49 @@ def _info(options: argparse.Namespace) -> int:
             print(f"  warning: {warning}")
 
     return for_each(map(Path, options.files), tell)
+
+
+def _tell_of_record(record: Record, path: Path, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(json.loads(record.to_json())))
+        return
+    print(f"{path}: {record.name}, norm {record.norm}, schedule {record.schedule}")
+    for model, fit in record.fits.items():
+        print(f" {preview.TITLES[model]}{'' if fit.converged else ', not converged'}")
+        for line in _fit_lines(fit):
+            print(f"   {line}")
+    for entry in record.closures:
+        print(f" closures: {entry['target']}, {entry['count']}, sphere error {entry['error']:.4f}")
+
+
+def _fit_lines(fit: Fit) -> Iterator[str]:
+    """What a fit found out, a line each."""
+    for name in ("diffuse", "specular", "exponent", "interpolation", "ior"):
+        if fit.parameters[name] is None:
+            continue
+        yield f"{name:14} {_numbers(fit.parameters[name])}"
+        for variable, (low, high) in fit.intervals.items():
+            if variable.split()[0] == name:
+                mark = "  undetermined" if variable in fit.uncertainty["undetermined"] else ""
+                yield f"  {variable:14} {low:.4g} to {high:.4g}{mark}"
+    for name, figure in fit.error.items():
+        yield f"{name:20} {_numbers(figure['pooled'])}  (rgb {_numbers(figure['rgb'])})"
+    if fit.error_by_angle:
+        view = fit.error_by_angle["view"]
+        steps = zip(pairwise(view["view_angle"]), view["misfit"], view["measured"], strict=True)
+        for (low, high), misfit, measured in list(steps)[::3]:
+            error = misfit / measured if measured > 0 else None
+            yield f"view at {low:2g} to {high:2g} deg  relative error {_numbers(error)}"
+    for angle, measured, model in zip(*fit.albedo.values(), strict=True):
+        yield f"albedo at {angle:2g} deg  measured {_numbers(measured)}, model {_numbers(model)}"
+    for warning in fit.warnings:
+        yield f"warning: {warning}"
+
+
+def _numbers(values: Any) -> str:
+    if isinstance(values, list):
+        return " ".join(map(_numbers, values))
+    return "unknown" if values is None else f"{values:.4g}"
 
 
 def _bin_warnings(bins: dict[str, int]) -> list[str]:
@@ -417,7 +470,8 @@ class Batch:
 
 def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
     names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
-    return {name: getattr(options, name) for name in names}
+    fitted = {name: getattr(options, name) for name in names}
+    return fitted | {"uncertainty": getattr(options, "uncertainty", False)}
 
 
 def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures] = ()) -> Record:
@@ -446,6 +500,8 @@ def _print_fit(record: Record, place: Path) -> None:
         figure = preview.FIGURES[record.leading_figure]
         mark = "*" if record.models and model == record.model else " "
         print(f" {mark} {model:20} {figure} {error:.4f}, {fit.seconds['total']:.2f} s")
+        if fit.uncertainty and fit.uncertainty["undetermined"]:
+            print(f"   undetermined: {', '.join(fit.uncertainty['undetermined'])}")
     for warning in record.warnings:
         print(f"   warning: {warning}")
 

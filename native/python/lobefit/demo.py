@@ -40,7 +40,8 @@ class _Demo:
     def add(self, path: Path) -> None:
         """One material, from its file to its picture."""
         with progress_bar(path.name) as progress:
-            record = record_of(path, progress, model="all", norm=VISUAL_NORM, closures=[Closures()])
+            fitted = {"model": "all", "norm": VISUAL_NORM, "uncertainty": True}
+            record = record_of(path, progress, closures=[Closures()], **fitted)
             if self.has_blender:
                 record = pictures.with_closures(record, progress)
         record.save(make_folder(self.folder / "records") / f"{path.stem}.json")

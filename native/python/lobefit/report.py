@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lobefit import picture, pictures, preview
+from lobefit import angles, picture, pictures, preview
 from lobefit.atomic import make_folder, write_bytes
 from lobefit.pictures import Picture
 from lobefit.plot import Line, legend, plot
@@ -63,6 +63,7 @@ tr.own td { font-weight: 600 } code { font-size: .85rem; overflow-wrap: anywhere
 .grid { stroke: var(--line) } .curve { fill: none; stroke-width: 2 }
 .legend span { margin-right: 1.1rem; font-size: .85rem; white-space: nowrap;
   display: inline-block } .legend svg { margin-right: .4rem }
+.maps > div { flex: 0 1 358px } .open { color: #b8741a }
 .warning { border-left: 3px solid #d9902f; padding-left: .7rem }
 """
 
@@ -170,7 +171,9 @@ def _section(
             _run_time_plot(record),
             "</div><div><h3>Albedo by view angle</h3>",
             _albedo_plot(record),
-            "</div></div><h3>Error of pictures against their cost</h3>",
+            "</div></div>",
+            angles.section(record, _COLORS),
+            "<h3>Error of pictures against their cost</h3>",
             _pictures(ways),
             "<h3>Seconds by stage</h3>",
             _stages(record),
@@ -206,7 +209,33 @@ def _parameters(record: Record) -> str:
         rest = (fit.parameters[name] for name in ("interpolation", "ior"))
         yes = "yes" if fit.converged else "no"
         rows.append([preview.TITLES[model], *map(_numbers, values), *map(_number, rest), yes])
-    return _table(head, rows, _own(record))
+    table = _table(head, rows, _own(record))
+    return table + _intervals(record) if record.uncertainty else table
+
+
+def _intervals(record: Record) -> str:
+    """A table with a row for every variable and a column for every fit."""
+    names = list(dict.fromkeys(name for fit in record.fits.values() for name in fit.intervals))
+    head = ["variable", *(preview.TITLES[model] for model in record.fits)]
+    rows = [[name, *(_interval(fit, name) for fit in record.fits.values())] for name in names]
+    confidence = record.uncertainty["confidence"]
+    return (
+        f"<h3>Intervals of {confidence:.0%} of the parameters</h3>"
+        f"{_table(head, rows)}"
+        '<p class="faint">From fits without each of '
+        f"{record.uncertainty['blocks']} parts of the data. What is "
+        '<span class="open">marked ?</span> is undetermined: within no factor of 2, an '
+        "interpolation within no half of its range.</p>"
+    )
+
+
+def _interval(fit: Fit, variable: str) -> str:
+    if variable not in fit.intervals:
+        return ""
+    text = " to ".join(f"{float(f'{end:.3g}'):g}" for end in fit.intervals[variable])
+    if variable in fit.uncertainty["undetermined"]:
+        return f'<span class="open">{text} ?</span>'
+    return text
 
 
 def _errors(record: Record) -> str:
@@ -224,6 +253,8 @@ def _stages(record: Record) -> str:
         for stage in fit.stages:
             cells = [f"{stage['seconds']:.3f}", str(stage["iterations"]), _number(stage["l1"])]
             rows.append(["", escape(stage["name"]), *cells])
+        if fit.uncertainty:
+            rows.append(["", "uncertainty", f"{fit.uncertainty['seconds']:.3f}", "", ""])
         rows.append(["", "total", f"{fit.seconds['total']:.3f}", "", ""])
     return _table(["model", "stage", "seconds", "iterations", "error after it"], rows)
 
