@@ -19,6 +19,8 @@ struct Stage {
   double error;
   double seconds;
   int iterations;
+  std::size_t samples;  // in the largest set that it went over
+  double touched;       // samples of all its passes together
 };
 
 // How sure the result is: of the `starts` that were polished on a subsample, `agree` ended within
@@ -39,9 +41,10 @@ struct Fit {
   std::vector<std::string> warnings;  // what is degenerate in the result, a sentence each
 };
 
-// Starts come from the data (scan_shapes). Schedule::stages then runs the paper's three stages on
-// all bins from the best of them; Schedule::polish runs stages and joint polish from each of them
-// on a subsample, and polishes the best on all bins. Throws Cancelled.
+// Starts come from the data (scan_shapes); what follows is the Schedule's. Throws Cancelled.
 Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor);
+
+// The best of the starts. Throws Cancelled.
+Parameters best_start(const Measurement& measurement, const FitOptions& options, Monitor& monitor);
 
 }  // namespace lobefit

@@ -12,28 +12,6 @@ namespace {
 
 constexpr int folded_phi_bins = Measurement::folded_phi_bins;
 
-// The median of the finite values of all channels, found from one in `stride`, or something
-// positive in its place: values of a table that is mostly zero are measured by their mean, those of
-// an all-zero one by 1. It is a unit alone, so that a few thousand values tell it well enough.
-double typical_reflectance(const Measurement& measurement, std::size_t stride = 61) {
-  constexpr std::size_t enough = 1000;
-  const auto planes = measurement.planes();
-  std::vector<double> values;
-  double sum = 0;
-  for (std::size_t i = 0; i < planes.size(); i += stride) {
-    if (std::isnan(planes[i])) continue;
-    values.push_back(planes[i]);
-    sum += planes[i];
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() >= enough && *middle > 0) return *middle;
-  if (stride > 1) return typical_reflectance(measurement, 1);
-  if (values.empty()) return 1;
-  if (*middle > 0) return *middle;
-  return sum > 0 ? sum / static_cast<double>(values.size()) : 1;
-}
-
 // Calls visit(column) for every column; columns differ in type.
 template <typename Visit>
 void for_each_column(Samples& s, const Visit& visit) {
@@ -182,6 +160,25 @@ void measure_importance(const Samples& samples, const Samples::Run& run, float* 
 }
 
 }  // namespace
+
+double typical_reflectance(const Measurement& measurement, std::size_t stride) {
+  constexpr std::size_t enough = 1000;
+  const auto planes = measurement.planes();
+  std::vector<double> values;
+  double sum = 0;
+  for (std::size_t i = 0; i < planes.size(); i += stride) {
+    if (std::isnan(planes[i])) continue;
+    values.push_back(planes[i]);
+    sum += planes[i];
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() >= enough && *middle > 0) return *middle;
+  if (stride > 1) return typical_reflectance(measurement, 1);
+  if (values.empty()) return 1;
+  if (*middle > 0) return *middle;
+  return sum > 0 ? sum / static_cast<double>(values.size()) : 1;
+}
 
 Samples all_samples(const Measurement& measurement, const FitOptions& options) {
   return Builder(measurement, options).build();

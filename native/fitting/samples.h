@@ -60,6 +60,11 @@ struct Samples {
   std::size_t size() const { return weight.size(); }
 };
 
+// The median of the finite values of all channels, found from one in `stride`, or something
+// positive in its place: values of a table that is mostly zero are measured by their mean, those of
+// an all-zero one by 1. It is a unit alone, so that a few thousand values tell it well enough.
+double typical_reflectance(const Measurement& measurement, std::size_t stride = 61);
+
 // All bins above the horizon and up to options.max_angle_degrees; invalid ones weigh 0.
 Samples all_samples(const Measurement& measurement, const FitOptions& options);
 
