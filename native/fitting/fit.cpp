@@ -63,12 +63,10 @@ class Fitter {
   Fit run() {
     const Stopwatch start_watch;
     monitor_.report(scan_stage, 0.1);
-    std::vector<Candidate> starts = scan_shapes(every_nth(few_, candidates_to_scan), variables_,
-                                                options_.norm, max_candidates, threads_, monitor_);
+    const std::vector<Candidate> starts = find_starts();
     fit_.start_seconds = start_watch.seconds();
     const Stopwatch fit_watch;
-    const VectorXd x = options_.schedule == Schedule::stages ? run_stages(starts.front().x)
-                                                             : run_polish(std::move(starts));
+    const VectorXd x = run_schedule(starts);
     fit_.fit_seconds = fit_watch.seconds();
     fit_.parameters = variables_.to_parameters(x, all_.unit);
     if (options_.uncertainty) {
@@ -81,7 +79,33 @@ class Fitter {
     return std::move(fit_);
   }
 
+  Parameters best_start() const {
+    return variables_.to_parameters(find_starts().front().x, all_.unit);
+  }
+
  private:
+  std::vector<Candidate> find_starts() const {
+    return scan_shapes(every_nth(few_, candidates_to_scan), variables_, options_.norm,
+                       max_candidates, threads_, monitor_);
+  }
+
+  VectorXd run_schedule(const std::vector<Candidate>& starts) {
+    switch (options_.schedule) {
+      case Schedule::stages:
+        return run_stages(starts.front().x);
+      case Schedule::joint:
+        monitor_.report("Fitting on all bins", 0.3);
+        return run_stage("all parameters on all bins", variables_.all(), starts.front().x,
+                         fine_precision())
+            .x;
+      case Schedule::subsample:
+        return run_subsample(starts);
+      case Schedule::polish:
+        break;
+    }
+    return run_polish(starts);
+  }
+
   VectorXd run_stages(VectorXd x) {
     const std::pair<const char*, std::vector<int>> stages[] = {
         {"(i) rho_d, k_s", variables_.reflectances()},
@@ -96,20 +120,42 @@ class Fitter {
     return x;
   }
 
-  VectorXd run_polish(std::vector<Candidate> candidates) {
+  // Polish from the starts on a subsample, and of the best of these on a larger one; the error that
+  // it leaves over all bins is not known then.
+  VectorXd run_on_subsample(const std::vector<Candidate>& candidates) {
     const Stopwatch watch;
+    Stage stage{"polish of " + std::to_string(candidates.size()) +
+                    " starts on a subsample, then of the best on a larger one",
+                0,
+                0,
+                0,
+                some_.size(),
+                0};
     monitor_.report("Trying the starts", 0.3);
-    std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision());
+    std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision(), stage);
     judge_certainty(minima);
     monitor_.report("Trying the best of them", 0.5);
     minima.resize(std::min(minima.size(), max_finalists));
-    const std::vector<Minimum> finalists = polish(some_, starts_of(minima), finishing_precision());
-    fit_.stages.push_back({"polish of " + std::to_string(candidates.size()) +
-                               " starts on a subsample, then of the best on a larger one",
-                           0, watch.seconds(), iterations_of(minima) + iterations_of(finalists)});
+    const std::vector<Minimum> finalists =
+        polish(some_, starts_of(minima), finishing_precision(), stage);
+    fit_.converged = finalists.front().converged;
+    stage.seconds = watch.seconds();
+    fit_.stages.push_back(stage);
+    return finalists.front().x;
+  }
+
+  VectorXd run_subsample(const std::vector<Candidate>& candidates) {
+    const VectorXd x = run_on_subsample(candidates);
+    constexpr double smoothing = 1;  // which the true value does not have
+    const Objective all(all_, variables_, options_.norm, smoothing, threads_);
+    fit_.stages.front().error = mean_error(all.evaluate(x).true_value);
+    return x;
+  }
+
+  VectorXd run_polish(const std::vector<Candidate>& candidates) {
+    const VectorXd x = run_on_subsample(candidates);
     monitor_.report("Polishing on all bins", 0.6);
-    const Minimum last =
-        run_stage("polish on all bins", variables_.all(), finalists.front().x, last_precision());
+    const Minimum last = run_stage("polish on all bins", variables_.all(), x, last_precision());
     // What the starts came to over all bins is where the last polish began.
     fit_.stages.front().error = mean_error(last.start_value);
     return last.x;
@@ -122,11 +168,6 @@ class Fitter {
     return points;
   }
 
-  static int iterations_of(const std::vector<Minimum>& minima) {
-    return std::accumulate(minima.begin(), minima.end(), 0,
-                           [](int sum, const Minimum& m) { return sum + m.iterations; });
-  }
-
   // All variables, but for a start whose alpha is 0 or 1: it stays there until the polish on all
   // bins, so that the result is no worse than the pure Phong or Blinn-Phong lobe. For s near 0 the
   // objective jumps where bins leave the lobe, and a subsample sees too few of those.
@@ -137,15 +178,19 @@ class Fitter {
     return free;
   }
 
-  // The minima on a subsample from all starts, best first.
+  // The minima on a subsample from all starts, best first; what they took is added to the stage.
   std::vector<Minimum> polish(const Samples& samples, const std::vector<VectorXd>& starts,
-                              const Precision& precision) const {
+                              const Precision& precision, Stage& stage) const {
     std::vector<Minimum> minima(starts.size());
     parallel_for(static_cast<int>(starts.size()), threads_, [&](int i) {
       const auto at = static_cast<std::size_t>(i);
       minima[at] = minimise(samples, variables_, options_.norm, movable(starts[at]), starts[at],
                             precision, 1, monitor_);
     });
+    for (const Minimum& minimum : minima) {
+      stage.iterations += minimum.iterations;
+      stage.touched += minimum.passes * static_cast<double>(samples.size());
+    }
     std::stable_sort(minima.begin(), minima.end(), [](const Minimum& left, const Minimum& right) {
       return left.true_value < right.true_value;
     });
@@ -158,8 +203,9 @@ class Fitter {
     Minimum minimum =
         minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_);
     fit_.converged = minimum.converged;
-    fit_.stages.push_back(
-        {name, mean_error(minimum.true_value), watch.seconds(), minimum.iterations});
+    fit_.stages.push_back({name, mean_error(minimum.true_value), watch.seconds(),
+                           minimum.iterations, all_.size(),
+                           minimum.passes * static_cast<double>(all_.size())});
     return minimum;
   }
 
@@ -239,6 +285,10 @@ class Fitter {
 
 Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor) {
   return Fitter(measurement, options, monitor).run();
+}
+
+Parameters best_start(const Measurement& measurement, const FitOptions& options, Monitor& monitor) {
+  return Fitter(measurement, options, monitor).best_start();
 }
 
 }  // namespace lobefit

@@ -105,7 +105,7 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const VectorXd& x, const Precision& precision,
                  int threads, const Monitor& monitor) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
-  Minimum best{variables.clamp(x), unknown, unknown, 0, false};
+  Minimum best{variables.clamp(x), unknown, unknown, 0, 0, false};
   Minimum current = best;
   const std::size_t levels = has_smoothing(norm) ? precision.smoothing.size() : 1;
   for (std::size_t level = 0; level < levels; ++level) {
@@ -118,7 +118,9 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
     current.true_value = objective.evaluate(current.x, Curvature::newton).true_value;
     const double gain = best.true_value - current.true_value;
     if (gain > 0) best = current;
+    current.passes += objective.passes();
     best.iterations = current.iterations;
+    best.passes = current.passes;
     if (gain < 1e-6 * best.true_value && level > 0) break;
   }
   return best;

@@ -85,4 +85,14 @@ Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const
   return parameters;
 }
 
+Eigen::VectorXd Variables::from_parameters(const Parameters& parameters, double unit) const {
+  Eigen::VectorXd x(count());
+  x.segment<3>(diffuse) = parameters.diffuse / (unit * pi);
+  x.segment<3>(specular) = parameters.specular / unit;
+  x.segment(log_exponent, exponents_) = parameters.exponent.head(exponents_).log();
+  if (interpolation_ >= 0) x[interpolation_] = parameters.interpolation;
+  if (log_excess_ior_ >= 0) x[log_excess_ior_] = std::log(parameters.ior.value() - 1);
+  return clamp(x);
+}
+
 }  // namespace lobefit

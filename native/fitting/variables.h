@@ -42,6 +42,8 @@ class Variables {
 
   // `unit` is the median reflectance in 1/sr.
   Parameters to_parameters(const Eigen::VectorXd& x, double unit) const;
+  // Its inverse, within the bounds.
+  Eigen::VectorXd from_parameters(const Parameters& parameters, double unit) const;
 
  private:
   ModelKind kind_;

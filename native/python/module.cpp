@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -20,10 +21,14 @@
 #include "closures/fit_closures.h"
 #include "closures/live_lobe.h"
 #include "closures/principled.h"
+#include "fitting/error_figures.h"
+#include "fitting/fit.h"
 #include "fitting/job.h"
+#include "fitting/naive_ceres.h"
 #include "measurement/input_error.h"
 #include "measurement/measurement.h"
 #include "measurement/merl.h"
+#include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
@@ -428,6 +433,57 @@ std::unique_ptr<ClosureJob> start_closure_job(const py::object& source, int coun
   });
 }
 
+// The result of a job that Python waits for; Ctrl-C ends it.
+template <typename Result>
+Result finished(std::function<Result(Monitor&)> work) {
+  Job<Result> job(std::move(work));
+  const auto wait = [&job] {
+    const py::gil_scoped_release release;
+    return job.wait(std::chrono::milliseconds(50));
+  };
+  while (!wait()) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+  return job.result();
+}
+
+Parameters start_of(const SharedMeasurement& measurement, int threads) {
+  return finished<Parameters>(
+      [=](Monitor& monitor) { return best_start(*measurement, {.threads = threads}, monitor); });
+}
+
+py::dict fit_by(const SharedMeasurement& measurement, const std::string& schedule, int threads) {
+  using namespace py::literals;
+  const FitOptions options{.schedule = schedule_named(schedule), .threads = threads};
+  const Fit fit =
+      finished<Fit>([=](Monitor& monitor) { return fit_model(*measurement, options, monitor); });
+  int iterations = 0;
+  double touched = 0;
+  for (const Stage& stage : fit.stages) {
+    iterations += stage.iterations;
+    touched += stage.touched;
+  }
+  // A sample is two bins, but for the few whose other half is invalid.
+  const auto bins =
+      std::min(static_cast<int>(2 * fit.stages.back().samples), measurement->bins().valid);
+  return py::dict("parameters"_a = to_dict(fit.parameters), "error"_a = to_dict(fit.errors),
+                  "bins"_a = bins, "iterations"_a = iterations, "touched"_a = 2 * touched);
+}
+
+py::dict fit_naively_by(const SharedMeasurement& measurement, const py::dict& start, int every,
+                        int threads) {
+  using namespace py::literals;
+  if (every < 1) throw InputError("every: expected 1 (all bins) or more, found less.");
+  const NaiveFit fit = finished<NaiveFit>([&, from = parameters_from(start)](Monitor& monitor) {
+    return fit_naively(*measurement, from, every, threads, monitor);
+  });
+  return py::dict(
+      "parameters"_a = to_dict(fit.parameters),
+      "error"_a = to_dict(error_figures(*measurement, fit.parameters, thread_count(threads))),
+      "bins"_a = fit.bins, "iterations"_a = fit.iterations,
+      "touched"_a = static_cast<double>(fit.passes) * fit.bins, "seconds"_a = fit.seconds);
+}
+
 template <typename Owner>
 void bind_job_methods(py::class_<Owner>& bound, auto job_of) {
   bound.def_property_readonly("progress", [=](Owner& o) { return job_of(o).progress(); })
@@ -508,6 +564,30 @@ void bind_jobs(py::module_& module) {
       "The closures as a dict; raises what ended the job.");
 }
 
+// The fit and its rivals, each waited for (lobefit.methods).
+void bind_methods(py::module_& module) {
+  module.def(
+      "best_start",
+      [](const SharedMeasurement& measurement, int threads) {
+        return to_dict(start_of(measurement, threads));
+      },
+      py::arg("measurement"), py::arg("threads") = 0,
+      "Where the fit of the interpolated model with Fresnel by L1 begins, as parameters.");
+  module.def("fit_by", &fit_by, py::arg("measurement"), py::arg("schedule"), py::arg("threads") = 0,
+             "The interpolated model with Fresnel by L1: parameters, error, bins that the last "
+             "step saw, iterations, and touched, the bins of all passes together.");
+  module.def("fit_naively", &fit_naively_by, py::arg("measurement"), py::arg("start"),
+             py::arg("every") = 1, py::arg("threads") = 0,
+             "The same by Ceres with a residual block for each channel of one in `every` bins; "
+             "also seconds, without those of the error figures.");
+  module.def(
+      "error_figures",
+      [](const Measurement& measurement, const py::dict& parameters) {
+        return to_dict(error_figures(measurement, parameters_from(parameters), thread_count(0)));
+      },
+      py::arg("measurement"), py::arg("parameters"), "The `error` of a record.");
+}
+
 void bind_errors(py::module_& module) {
   py::register_exception<InputError>(module, "InputError", PyExc_ValueError);
   py::register_exception<Cancelled>(module, "Cancelled");
@@ -568,4 +648,5 @@ PYBIND11_MODULE(_native, module) {
   lobefit::bind_measurement(module);
   lobefit::bind_jobs(module);
   lobefit::bind_functions(module);
+  lobefit::bind_methods(module);
 }

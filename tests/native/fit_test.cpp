@@ -215,6 +215,27 @@ TEST(Fit, FindsTheViewAngleOfAnError) {
   EXPECT_EQ(most - views.begin(), 12);
 }
 
+// Under noise of 10 % all bins determine one optimum, to the 1e-4 that the smoothing leaves. Of the
+// 32,000 bins of a subsample nine parameters take up their share, 1e-4 of the error as well.
+TEST(Fit, HasOneOptimumByEverySchedule) {
+  const Parameters known = truth(ModelKind::interpolated, 40, 0.6, 1.8);
+  const Measurement table = Measurement::tabulate([&](const HalfDifference& at) -> Rgb {
+    const double noise = std::sin(1e4 * at.theta_h + 7e3 * at.theta_d + 3e3 * at.phi_d);
+    return evaluate_model(known, at) * (1 + 0.1 * noise);
+  });
+  const auto fitted = [&](Schedule schedule) {
+    const Fit fit = fit_of(table, {.schedule = schedule});
+    EXPECT_NEAR(fit.stages.back().error, fit.errors.l1.pooled, 1e-6 * fit.errors.l1.pooled);
+    return fit;
+  };
+  const Fit joint = fitted(Schedule::joint), part = fitted(Schedule::subsample);
+  const double least = fitted(Schedule::polish).errors.l1.pooled;
+  EXPECT_NEAR(joint.errors.l1.pooled, least, 1e-4 * least);
+  EXPECT_NEAR(part.errors.l1.pooled, least, 1e-3 * least);
+  EXPECT_LT(part.stages.back().samples, joint.stages.back().samples / 10);
+  EXPECT_LT(part.stages.back().touched, joint.stages.back().touched);
+}
+
 TEST(Fit, OfTheCosineNormHasTheLeastCosineError) {
   const Measurement sample = sample_measurement("nickel");
   FitOptions options;

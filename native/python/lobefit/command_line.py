@@ -16,7 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
-from lobefit import _native, blender, picture, pictures, preview, report, simplified
+from lobefit import _native, blender, methods, picture, pictures, preview, report, simplified
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
@@ -29,7 +29,7 @@ from lobefit.inputs import (
     spread,
 )
 from lobefit.origin import origin_of, write_samples
-from lobefit.record import MODELS, VISUAL_NORM, Fit, Record
+from lobefit.record import MODELS, SCHEDULES, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
@@ -202,7 +202,7 @@ def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) ->
     group = command.add_argument_group("fit of a measured file")
     group.add_argument("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
     group.add_argument("--no-fresnel", dest="fresnel", action="store_false")
-    group.add_argument("--schedule", choices=("stages", "polish"), default="polish", help=_DEFAULT)
+    group.add_argument("--schedule", choices=SCHEDULES, default="polish", help=_DEFAULT)
     group.add_argument(
         "--norm", choices=("l1", "cosine-l1", "l2", "log-l2"), default=norm, help=_DEFAULT
     )
@@ -573,9 +573,18 @@ def _report(options: argparse.Namespace) -> int:
         if blender.has_blender():
             records = [_with_closures(record) for record in records]
             ways = {record.name: pictures.measure(record) for record in records}
-        report.write(options.output, records, ways=ways)
+        trials = {record.name: _trials(record, options.threads) for record in records}
+        report.write(options.output, records, ways=ways, trials=trials)
         print(Path(options.output) / "index.html")
     return code
+
+
+def _trials(record: Record, threads: int) -> list[methods.Trial]:
+    measurement = preview.measurement_of(record)
+    if measurement is None:
+        return []
+    with progress_bar(record.name) as progress:
+        return methods.compare(measurement, progress, threads)
 
 
 def _with_closures(record: Record) -> Record:

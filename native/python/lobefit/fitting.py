@@ -81,8 +81,10 @@ class Job:
 
     `source` is a file, a measurement, or a record, whose fit is then kept. `model` is one of
     `record.MODELS`, or "all" for one after the other. `closures` are approximations to find after
-    the fit. `fresnel` False fits the models without the Fresnel term. `schedule` is "stages" (the
-    three of Nielsen et al.) or "polish" (a joint fit after them). `norm` is "l1" (the paper's),
+    the fit. `fresnel` False fits the models without the Fresnel term. `schedule` is "polish" (all
+    parameters jointly, from many starts on a subsample, and the best on all bins), "subsample" (the
+    same without its end on all bins), "joint" (on all bins from the best start) or "stages" (there,
+    the three of Nielsen et al.). `norm` is "l1" (the paper's),
     "cosine-l1", "l2" or "log-l2". `max_angle` in degrees (up to 90) leaves out light and view
     directions beyond it. `channels` is "shared" (one exponent) or "separate". `uncertainty` True
     also finds how well the data determine the parameters, which takes up to three times as long as

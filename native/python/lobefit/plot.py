@@ -1,4 +1,4 @@
-"""Line plots as inline SVG, as much of a plotting library as the report needs."""
+"""Plots as inline SVG, as much of a plotting library as the report needs."""
 
 import math
 from collections.abc import Sequence
@@ -67,16 +67,20 @@ def plot(
     heights = [y for _, y in known]
     y_ticks = _decades(min(heights), max(heights)) if log else _ticks(max(heights))
     axes = _Axes(x_scale, _Scale(y_ticks, y_ticks[-1], log))
-    parts = [
-        f'<svg class="plot" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" '
-        f'aria-label="{escape(y_title)} over {escape(x_title)}">',
-        axes.grid(),
-        f'<text x="{(_LEFT + _WIDTH - _RIGHT) / 2}" y="{_HEIGHT - 6}" class="middle">'
-        f"{escape(x_title)}</text>",
-        f'<text transform="translate(13 {(_TOP + _HEIGHT - _BOTTOM) / 2}) rotate(-90)" '
-        f'class="middle">{escape(y_title)}</text>',
-    ]
-    return "".join(parts + [axes.curve(line) for line in lines]) + "</svg>"
+    drawn = axes.grid() + "".join(axes.curve(line) for line in lines)
+    return framed(drawn, x_title, y_title, _WIDTH, _HEIGHT)
+
+
+def framed(drawn: str, x_title: str, y_title: str, width: int, height: int) -> str:
+    """What is drawn between the axes as an SVG element with the titles of the axes."""
+    return (
+        f'<svg class="plot" viewBox="0 0 {width} {height}" role="img" '
+        f'aria-label="{escape(y_title)} over {escape(x_title)}">{drawn}'
+        f'<text x="{(_LEFT + width - _RIGHT) / 2}" y="{height - 6}" class="middle">'
+        f"{escape(x_title)}</text>"
+        f'<text transform="translate(13 {(_TOP + height - _BOTTOM) / 2}) rotate(-90)" '
+        f'class="middle">{escape(y_title)}</text></svg>'
+    )
 
 
 def legend(lines: Sequence[Line]) -> str:

@@ -18,6 +18,8 @@ from lobefit.atomic import reason, write_bytes
 
 SCHEMA = 1
 MODELS = ("modified-phong", "modified-blinn-phong", "interpolated")
+# How a fit goes about it; see `Job`.
+SCHEDULES = ("stages", "polish", "joint", "subsample")
 ERRORS = ("l1", "relative_l1", "relative_l1_80", "relative_l1_cosine")
 
 _CHANNELS = ("red", "green", "blue", "")
@@ -462,7 +464,7 @@ _RECORD = _fit(
             {"path": _or_null(_TEXT), "sha256": _or_null(_TEXT), "format": _TEXT, "bins": _BINS},
             {"name": _TEXT},
         ),
-        "schedule": _choice("stages", "polish"),
+        "schedule": _choice(*SCHEDULES),
         "norm": _choice("l1", "cosine-l1", "l2", "log-l2"),
         "channels": _choice("shared", "separate"),
         "max_angle": _number(0, 90, "a number from 0 to 90"),
