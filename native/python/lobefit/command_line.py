@@ -8,23 +8,22 @@ import argparse
 import json
 import os
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from lobefit import _native, blender, methods, picture, pictures, preview, report, simplified
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
+from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_in
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
     MEASUREMENT_SUFFIXES,
     RECORD_SUFFIX,
     Progress,
-    kept_record,
     record_of,
     spread,
 )
@@ -34,6 +33,8 @@ from lobefit.record import MODELS, SCHEDULES, VISUAL_NORM, Fit, Record
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
 _BAR = 24  # characters
+
+Item = TypeVar("Item")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -60,18 +61,19 @@ def _complain(problem: object) -> int:
     return WRONG
 
 
-def for_each(paths: Iterable[Path], work: Callable[[Path], None]) -> int:
-    """Does `work` for every path, names those that fail on stderr, and returns the exit code."""
-    places, failed = list(paths), 0
-    for path in places:
+def for_each(items: Iterable[Item], work: Callable[[Item], None]) -> int:
+    """Does `work` for every item, tells of those that fail on stderr, and returns the exit code."""
+    count = failed = 0
+    for item in items:
+        count += 1
         try:
-            work(path)
+            work(item)
         except InputError as error:
             failed += 1
             _complain(error)
     if failed == 0:
         return DONE
-    return SOME_FAILED if len(places) > 1 else WRONG
+    return SOME_FAILED if count > 1 else WRONG
 
 
 @contextmanager
@@ -174,6 +176,20 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also how well the data determine the parameters (up to 3 more times as long)",
     )
+    where = command.add_mutually_exclusive_group()
+    where.add_argument(
+        "--jobs",
+        type=_within(int, 1, 1024, "a number"),
+        default=1,
+        metavar="N",
+        help="files at once, each in a process with its share of the processors; " + _DEFAULT,
+    )
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a Dask cluster to compute on, as tcp://HOST:8786; its workers have the same build "
+        "of Lobefit and read the files by the same paths",
+    )
     _add_json(command)
 
 
@@ -221,7 +237,7 @@ def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) ->
         type=_within(int, 0, 1024, "a number"),
         default=0,
         metavar="N",
-        help="0: every processor",
+        help="0: every processor, or a job's share of them; on a cluster one",
     )
 
 
@@ -416,56 +432,32 @@ def _write_records(
     tell: Callable[[Record, Path], None],
 ) -> int:
     """Writes the record of every file of a command line, and tells of it."""
-    output = Path(options.output)
+    output, fitted = Path(options.output), _fit_options(options)
     one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
     paths = spread(options.files, suffixes)
-    if not one:
-        make_folder(output)
+    way = on_cluster(options.scheduler) if options.scheduler else in_processes(options.jobs)
+    if one:
+        tasks = [Task(paths[0], output, closures, fitted)]
+    else:
+        tasks = tasks_in(make_folder(output), paths, closures, fitted)
 
-    batch = Batch(len(paths))
-
-    def write_one(path: Path) -> None:
-        place = output if one else output / f"{path.stem}{RECORD_SUFFIX}"
-        place_to_write(place)
-        fitted = _fit_options(options)
-        # A folder that was interrupted goes on where it stopped.
-        keeps = not one and not options.again
-        record = kept_record(place, path, closures, **fitted) if keeps else None
-        name = batch.next(path, kept=record is not None)
-        if record is None:
-            with progress_bar(name) as progress:
-                record = record_of(path, progress, closures=closures, **fitted)
-            record.save(place)
+    def show(ended: Ended) -> None:
+        task, record = ended
+        if isinstance(record, InputError):
+            raise record
         if options.json:
-            print(json.dumps({"record": str(place)} | json.loads(record.to_json())))
+            print(json.dumps({"record": str(task.place)} | json.loads(record.to_json())))
         else:
-            tell(record, place)
+            tell(record, task.place)
 
-    code = for_each(paths, write_one)
+    # A folder that was interrupted goes on where it stopped.
+    batch = Batch(tasks, way, keep=not one and not options.again, bar=progress_bar)
+    with closing(batch.run()) as ended:
+        code = for_each(ended, show)
     if batch.kept:
-        kept = f"{batch.kept} of {batch.count} kept from before (--again computes them anew)"
+        kept = f"{batch.kept} of {len(tasks)} kept from before (--again computes them anew)"
         print(f"lobefit: {kept}", file=sys.stderr)
     return code
-
-
-class Batch:
-    """How far a command is through its files."""
-
-    def __init__(self, count: int) -> None:
-        self.count, self.kept = count, 0
-        self._begun, self._start = 0, time.monotonic()
-
-    def next(self, path: Path, kept: bool) -> str:
-        """What stands before the bar of the next file: its number, and the time left for all."""
-        computed = self._begun - self.kept
-        self._begun += 1
-        self.kept += kept
-        if self.count == 1:
-            return path.name
-        # What is kept takes no time.
-        each = (time.monotonic() - self._start) / max(computed, 1)
-        left = f", {each * (self.count - self._begun + 1):.0f} s left" if computed else ""
-        return f"{self._begun}/{self.count}{left}: {path.name}"
 
 
 def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
