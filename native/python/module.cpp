@@ -24,7 +24,10 @@
 #include "fitting/error_figures.h"
 #include "fitting/fit.h"
 #include "fitting/job.h"
+#include "fitting/minimise.h"
 #include "fitting/naive_ceres.h"
+#include "fitting/samples.h"
+#include "fitting/variables.h"
 #include "measurement/input_error.h"
 #include "measurement/measurement.h"
 #include "measurement/merl.h"
@@ -447,6 +450,17 @@ Result finished(std::function<Result(Monitor&)> work) {
   return job.result();
 }
 
+py::dict l1_terms(const Measurement& measurement) {
+  using namespace py::literals;
+  const Variables variables(ModelKind::interpolated, true, false);
+  const auto list = [](const Eigen::VectorXd& x) {
+    return std::vector<double>(x.begin(), x.end());
+  };
+  return py::dict("unit"_a = typical_reflectance(measurement),
+                  "smoothing"_a = fine_precision().smoothing.back(),
+                  "lower"_a = list(variables.lower()), "upper"_a = list(variables.upper()));
+}
+
 Parameters start_of(const SharedMeasurement& measurement, int threads) {
   return finished<Parameters>(
       [=](Monitor& monitor) { return best_start(*measurement, {.threads = threads}, monitor); });
@@ -573,6 +587,10 @@ void bind_methods(py::module_& module) {
       },
       py::arg("measurement"), py::arg("threads") = 0,
       "Where the fit of the interpolated model with Fresnel by L1 begins, as parameters.");
+  module.def("l1_terms", &l1_terms, py::arg("measurement"),
+             "What that fit ends on: the unit of reflectance in 1/sr and, in this unit, the "
+             "smoothing of |r| and the bounds of rho_d/pi and k_s of three channels, log s, alpha "
+             "and log(eta - 1).");
   module.def("fit_by", &fit_by, py::arg("measurement"), py::arg("schedule"), py::arg("threads") = 0,
              "The interpolated model with Fresnel by L1: parameters, error, bins that the last "
              "step saw, iterations, and touched, the bins of all passes together.");

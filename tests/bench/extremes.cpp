@@ -1,9 +1,9 @@
 // Fits at the end of what a table can hold: ./dev bench extremes
 //
-// For each of tests/native/extreme_tables.h: the relative L1 over all bins of the fit and of the
-// truth (where there is one), the largest relative error of a parameter, whether it converged,
-// iterations, seconds, the ratio of the extreme eigenvalues of the column-scaled Newton matrix
-// where the fit ended (inf: not positive definite), and the warnings.
+// For each of extreme_tables() in tests/native/tables.h: the relative L1 over all bins of the fit
+// and of the truth (where there is one), the largest relative error of a parameter, whether it
+// converged, iterations, seconds, the ratio of the extreme eigenvalues of the column-scaled Newton
+// matrix where the fit ended (inf: not positive definite), and the warnings.
 #include <Eigen/Eigenvalues>
 #include <chrono>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <limits>
 #include <string>
 
-#include "../native/extreme_tables.h"
+#include "../native/tables.h"
 #include "fitting/fit.h"
 #include "fitting/objective.h"
 #include "measurement/input_error.h"
@@ -34,20 +34,12 @@ double parameter_error(const Parameters& truth, const Parameters& found) {
   return truth.ior ? std::max(worst, relative(*truth.ior - 1, *found.ior - 1)) : worst;
 }
 
-// The variables that Variables::to_parameters makes these parameters of.
-Eigen::VectorXd to_variables(const Parameters& parameters, double unit) {
-  Eigen::VectorXd x(9);
-  x << (parameters.diffuse / (unit * pi)).matrix(), (parameters.specular / unit).matrix(),
-      std::log(parameters.exponent[0]), parameters.interpolation, std::log(*parameters.ior - 1);
-  return x;
-}
-
 double conditioning(const Measurement& measurement, const Parameters& parameters) {
   const FitOptions options;
   const Samples samples = all_samples(measurement, options);
   const Variables variables(options.kind, options.fresnel, options.separate_channels);
   const Objective objective(samples, variables, options.norm, 0.01, 2);
-  const Eigen::VectorXd x = variables.clamp(to_variables(parameters, samples.unit));
+  const Eigen::VectorXd x = variables.from_parameters(parameters, samples.unit);
   const Eigen::MatrixXd matrix = objective.evaluate(x, Curvature::newton).hessian;
   const Eigen::VectorXd scale = matrix.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();
   if (!scale.allFinite()) return std::numeric_limits<double>::infinity();

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "extreme_tables.h"
 #include "reflectance/abc.h"
+#include "tables.h"
 
 namespace lobefit {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <string>
 
-#include "extreme_tables.h"
 #include "fitting/fit.h"
 #include "fitting/variables.h"
 #include "measurement/input_error.h"
+#include "tables.h"
 
 namespace lobefit {
 namespace {
@@ -45,6 +45,11 @@ void expect_usable(const Fit& fit, const FitOptions& options) {
   }
   for (const Stage& stage : fit.stages) EXPECT_TRUE(std::isfinite(stage.error)) << stage.name;
   EXPECT_TRUE(std::isfinite(fit.certainty.spread));
+  if (fit.uncertainty) {
+    EXPECT_TRUE(fit.uncertainty->correlation.allFinite());
+    EXPECT_TRUE(fit.uncertainty->high.diffuse.isFinite().all());
+    EXPECT_TRUE(fit.uncertainty->high.specular.isFinite().all());
+  }
   // Six starts with two levels and two finalists with two, each of at most three full solves and a
   // last one; an ordinary table takes 20 to 200.
   EXPECT_LT(iterations_of(fit), 5000);
@@ -125,7 +130,7 @@ TEST(Extremes, ScaleTheirParametersAndNothingElse) {
 
 // The nastiest tables by every norm, schedule and kind of model.
 TEST(Extremes, AreFiniteWhateverIsAsked) {
-  std::vector<FitOptions> asked(8);
+  std::vector<FitOptions> asked(9);
   asked[0].norm = Norm::cosine_l1;
   asked[1].norm = Norm::l2;
   asked[2].norm = Norm::log_l2;
@@ -134,6 +139,7 @@ TEST(Extremes, AreFiniteWhateverIsAsked) {
   asked[5].kind = ModelKind::modified_blinn_phong;
   asked[6].separate_channels = true;
   asked[7].fresnel = false;
+  asked[8].uncertainty = true;
   for (const ExtremeTable& table : extreme_tables()) {
     const bool nasty = table.name == "all zero" || table.name == "one valid bin" ||
                        table.name == "one bin of 1e300" || table.name == "a lobe on black" ||

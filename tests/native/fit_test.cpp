@@ -12,14 +12,10 @@
 #include "fitting/samples.h"
 #include "fitting/variables.h"
 #include "reflectance/abc.h"
+#include "tables.h"
 
 namespace lobefit {
 namespace {
-
-Measurement table_of(const Parameters& parameters) {
-  return Measurement::tabulate(
-      [&](const HalfDifference& at) { return evaluate_model(parameters, at); });
-}
 
 Fit fit_of(const Measurement& measurement, const FitOptions& options) {
   Monitor monitor;
@@ -219,10 +215,7 @@ TEST(Fit, FindsTheViewAngleOfAnError) {
 // 32,000 bins of a subsample nine parameters take up their share, 1e-4 of the error as well.
 TEST(Fit, HasOneOptimumByEverySchedule) {
   const Parameters known = truth(ModelKind::interpolated, 40, 0.6, 1.8);
-  const Measurement table = Measurement::tabulate([&](const HalfDifference& at) -> Rgb {
-    const double noise = std::sin(1e4 * at.theta_h + 7e3 * at.theta_d + 3e3 * at.phi_d);
-    return evaluate_model(known, at) * (1 + 0.1 * noise);
-  });
+  const Measurement table = noisy_table_of(known, 0.1);
   const auto fitted = [&](Schedule schedule) {
     const Fit fit = fit_of(table, {.schedule = schedule});
     EXPECT_NEAR(fit.stages.back().error, fit.errors.l1.pooled, 1e-6 * fit.errors.l1.pooled);

@@ -11,16 +11,12 @@
 #include "fitting/fit.h"
 #include "fitting/minimise.h"
 #include "reflectance/abc.h"
+#include "tables.h"
 
 namespace lobefit {
 namespace {
 
 using Eigen::VectorXd;
-
-Measurement table_of(const Parameters& parameters) {
-  return Measurement::tabulate(
-      [&](const HalfDifference& at) { return evaluate_model(parameters, at); });
-}
 
 Parameters lobe(double exponent, double alpha, double ior) {
   Parameters parameters;
@@ -80,9 +76,9 @@ TEST(Jackknife, BlocksAreWidePatchesOfAboutOneSize) {
   EXPECT_LT(*std::max_element(sizes.begin(), sizes.end()), 2 * even);
 }
 
-// Of intervals of 95 % over 40 draws fewer than 32 cover the truth less often than once in 10,000.
+// Of intervals of 95 % over 24 draws fewer than 18 cover the truth less often than once in 10,000.
 TEST(Jackknife, IntervalsCoverTheTruthAboutAsOftenAsTheySay) {
-  constexpr int draws = 40;
+  constexpr int draws = 24;
   const Parameters known = lobe(40, 0.6, 1.8);
   const Measurement table = table_of(known);
   const FitOptions options;
@@ -92,12 +88,10 @@ TEST(Jackknife, IntervalsCoverTheTruthAboutAsOftenAsTheySay) {
   std::vector<int> covered(static_cast<std::size_t>(variables.count()), 0);
   for (int draw = 0; draw < draws; ++draw) {
     const Samples samples = subsample(all_samples(with_noise(table, 0.05, random), options), 16000);
-    VectorXd x(variables.count());
-    x << known.diffuse.matrix() / (pi * samples.unit), known.specular.matrix() / samples.unit,
-        std::log(known.exponent[0]), known.interpolation, std::log(*known.ior - 1);
-    x = minimise(samples, variables, options.norm, variables.all(), x, finishing_precision(), 2,
-                 monitor)
-            .x;
+    const VectorXd from = variables.from_parameters(known, samples.unit);
+    const VectorXd x = minimise(samples, variables, options.norm, variables.all(), from,
+                                finishing_precision(), 2, monitor)
+                           .x;
     const Uncertainty found = jackknife(samples, variables, options.norm, x, 2, monitor);
     const auto count = [&](int i, double low, double truth, double high) {
       covered[static_cast<std::size_t>(i)] += low <= truth && truth <= high;
@@ -111,7 +105,7 @@ TEST(Jackknife, IntervalsCoverTheTruthAboutAsOftenAsTheySay) {
     count(8, *found.low.ior, *known.ior, *found.high.ior);
   }
   for (std::size_t i = 0; i < covered.size(); ++i) {
-    EXPECT_GE(covered[i], 0.8 * draws) << variables.names()[i];
+    EXPECT_GE(covered[i], 0.75 * draws) << variables.names()[i];
   }
 }
 

@@ -2,12 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "fitting/error_figures.h"
 #include "fitting/fit.h"
-#include "measurement/half_difference.h"
-#include "reflectance/model.h"
+#include "tables.h"
 
 namespace lobefit {
 namespace {
@@ -20,29 +17,12 @@ NaiveFit naive_fit(const Measurement& measurement) {
   return fit_naively(measurement, best_start(measurement, {}, monitor), thinned, threads, monitor);
 }
 
-// A lobe under noise of so many parts of itself, the same at every run.
-Measurement noisy_lobe(const Parameters& known, double noise) {
-  return Measurement::tabulate([&](const HalfDifference& at) -> Rgb {
-    const double phase = 1e4 * at.theta_h + 7e3 * at.theta_d + 3e3 * at.phi_d;
-    return evaluate_model(known, at) * (1 + noise * std::sin(phase));
-  });
-}
-
-Parameters known_lobe() {
-  Parameters known;
-  known.diffuse = {0.2, 0.15, 0.1};
-  known.specular = {3, 2.5, 2};
-  known.exponent.setConstant(40);
-  known.interpolation = 0.6;
-  known.ior = 1.8;
-  return known;
-}
+const Parameters known = lobe_of(40, 0.6, 1.8);
 
 // Without noise one bin in 401 determines the nine parameters as well as all do; 1 % is what the
 // smoothing and Ceres' tolerance leave.
 TEST(NaiveCeres, FindsAKnownLobe) {
-  const Parameters known = known_lobe();
-  const Measurement table = noisy_lobe(known, 0);
+  const Measurement table = table_of(known);
   const NaiveFit found = naive_fit(table);
   EXPECT_TRUE(found.converged);
   EXPECT_NEAR(found.bins, table.bins().valid / thinned, 1);
@@ -59,7 +39,7 @@ TEST(NaiveCeres, FindsAKnownLobe) {
 // three channels each, some 9 / 8,100 of it; three times that is allowed. It cannot be below that
 // of all bins but for the smoothing.
 TEST(NaiveCeres, ComesToTheErrorOfTheFit) {
-  const Measurement table = noisy_lobe(known_lobe(), 0.1);
+  const Measurement table = noisy_table_of(known, 0.1);
   Monitor monitor;
   const double fitted = fit_model(table, {}, monitor).errors.l1.pooled;
   const double naive = error_figures(table, naive_fit(table).parameters, threads).l1.pooled;
@@ -68,7 +48,7 @@ TEST(NaiveCeres, ComesToTheErrorOfTheFit) {
 }
 
 TEST(NaiveCeres, CanBeCancelled) {
-  const Measurement measurement = noisy_lobe(known_lobe(), 0);
+  const Measurement measurement = table_of(known);
   Monitor monitor;
   const Parameters start = best_start(measurement, {}, monitor);
   monitor.cancel();

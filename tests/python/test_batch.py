@@ -19,6 +19,10 @@ from lobefit.command_line import main
 from lobefit.origin import origin_of, write_samples
 
 PATIENCE = 60  # seconds after which what should have happened never will
+# All that a record may hold, and no more work than that takes.
+EVERYTHING = ["closures", "--closures", "1", "--uncertainty"]
+MANY = 8
+NAMES = {f"{index}.json" for index in range(MANY)}
 
 
 def await_that(holds: Callable[[], object], process: subprocess.Popen | None = None) -> None:
@@ -91,10 +95,10 @@ def different(tmp_path_factory, table) -> Path:
 
 @pytest.fixture
 def many(tmp_path, table) -> Path:
-    """A folder of ten tables."""
+    """A folder of tables, of which some are left when the first has its record."""
     folder = tmp_path / "many"
     folder.mkdir()
-    for index in range(10):
+    for index in range(MANY):
         (folder / f"{index}.binary").symlink_to(table)
     return folder
 
@@ -103,13 +107,13 @@ def many(tmp_path, table) -> Path:
 def alone(tmp_path_factory, different) -> Path:
     """The records of `different` as one process makes them."""
     folder = tmp_path_factory.mktemp("alone")
-    assert main(["closures", str(different), "-o", str(folder)]) == 0
+    assert main([*EVERYTHING, str(different), "-o", str(folder)]) == 0
     return folder
 
 
 def test_several_jobs_find_what_one_finds(tmp_path, different, alone, capfd):
     out = tmp_path / "out"
-    assert main(["closures", str(different), "--jobs", "2", "--json", "-o", str(out)]) == 0
+    assert main([*EVERYTHING, str(different), "--jobs", "2", "--json", "-o", str(out)]) == 0
     told = capfd.readouterr()
     places = [json.loads(line)["record"] for line in told.out.splitlines()]
     assert sorted(places) == sorted(str(path) for path in out.iterdir())
@@ -125,13 +129,13 @@ def test_a_killed_worker_costs_its_file_alone(tmp_path, many):
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert err.count("\n") == 1 and "SIGKILL" in err
-    (lost,) = {f"{index}.json" for index in range(10)} - set(finished(out))
+    (lost,) = NAMES - set(finished(out))
     assert f"{many / lost}".replace(".json", ".binary: ") in err
-    assert len(os.listdir(out)) == 9
+    assert len(os.listdir(out)) == MANY - 1
     # The same command does what is missing, and nothing else.
     before = finished(out)
     again = start("fit", many, "--jobs", "2", "-o", out)
-    assert "9 of 10 kept" in again.communicate(timeout=PATIENCE)[1]
+    assert f"{MANY - 1} of {MANY} kept" in again.communicate(timeout=PATIENCE)[1]
     after = finished(out)
     assert again.returncode == 0
     assert after.pop(lost)
@@ -141,7 +145,7 @@ def test_a_killed_worker_costs_its_file_alone(tmp_path, many):
 @pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
 def test_the_end_of_a_batch_is_the_end_of_its_workers(tmp_path, many, end, code):
     out = tmp_path / "out"
-    process = start("closures", many, "--jobs", "2", "-o", out)
+    process = start("fit", many, "--jobs", "2", "-o", out)
     await_that(lambda: finished(out), process)
     if end == signal.SIGINT:
         os.killpg(process.pid, end)  # as a terminal does
@@ -151,7 +155,7 @@ def test_the_end_of_a_batch_is_the_end_of_its_workers(tmp_path, many, end, code)
     assert process.returncode == code
     assert err == ("lobefit: interrupted\n" if end == signal.SIGINT else "")
     await_that(lambda: not processes_of(process.pid))
-    assert set(finished(out)) == set(os.listdir(out)) < {f"{index}.json" for index in range(10)}
+    assert set(finished(out)) == set(os.listdir(out)) < NAMES
 
 
 def test_a_bad_file_is_told_and_the_others_done(tmp_path, table, capfd):
@@ -241,7 +245,7 @@ def cluster():
 
 def test_a_cluster_finds_what_one_process_finds(tmp_path, different, alone, cluster, capfd):
     address = cluster.scheduler_address
-    command = ["closures", str(different), "--scheduler", address, "-o", str(tmp_path)]
+    command = [*EVERYTHING, str(different), "--scheduler", address, "-o", str(tmp_path)]
     assert main(command) == 0
     assert capfd.readouterr().err == ""
     assert results(tmp_path) == results(alone)
@@ -264,9 +268,9 @@ def test_a_cluster_does_again_what_a_killed_worker_had(tmp_path, many, cluster):
     told, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, err) == (0, "")
     places = [json.loads(line)["record"] for line in told.splitlines()]
-    assert sorted(places) == [str(out / f"{index}.json") for index in range(10)]
+    assert sorted(places) == sorted(str(out / name) for name in NAMES)
     after = finished(out)
-    assert len(after) == len(os.listdir(out)) == 10
+    assert set(after) == set(os.listdir(out)) == NAMES
     assert {name: after[name] for name in done} == done
     record, *others = [content for _, content in sorted(results(out).items())]
     for other in others:
@@ -277,7 +281,7 @@ def test_ctrl_c_leaves_the_cluster_idle(tmp_path, many, cluster):
     from distributed import Client
 
     out = tmp_path / "out"
-    process = start("closures", many, "--scheduler", cluster.scheduler_address, "-o", out)
+    process = start("fit", many, "--scheduler", cluster.scheduler_address, "-o", out)
     await_that(lambda: finished(out), process)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=PATIENCE)

@@ -215,6 +215,7 @@ def _add_closure_options(command: argparse.ArgumentParser) -> None:
 
 
 def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) -> None:
+    command.set_defaults(uncertainty=False)
     group = command.add_argument_group("fit of a measured file")
     group.add_argument("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
     group.add_argument("--no-fresnel", dest="fresnel", action="store_false")
@@ -462,8 +463,7 @@ def _write_records(
 
 def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
     names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
-    fitted = {name: getattr(options, name) for name in names}
-    return fitted | {"uncertainty": getattr(options, "uncertainty", False)}
+    return {name: getattr(options, name) for name in (*names, "uncertainty")}
 
 
 def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures] = ()) -> Record:

@@ -34,13 +34,6 @@ THINNED = 101
 
 Floats = NDArray[np.float64]
 
-# The smoothing of |r| and the bounds of native/fitting (minimise.cpp, variables.cpp), there and
-# here in units of the median reflectance: rho_d/pi and k_s of three channels, log s, alpha,
-# log(eta - 1).
-_SMOOTHING = 0.01
-_LOWER = np.array([0.0] * 6 + [np.log(1e-4), 0.0, np.log(1e-4)])
-_UPPER = np.array([np.inf] * 6 + [np.log(1e8), 1.0, np.log(199.0)])
-
 
 @dataclass(frozen=True)
 class Trial:
@@ -140,12 +133,12 @@ def fit_by_scipy(
     problem = _Problem(measurement, every)
     x = problem.variables(start)
     iterations = evaluations = 0
-    for smoothing in (10 * _SMOOTHING, _SMOOTHING):
+    for smoothing in (10 * problem.smoothing, problem.smoothing):
         found = least_squares(
             problem.misfit,
-            np.clip(x, _LOWER, _UPPER),
+            np.clip(x, problem.lower, problem.upper),
             problem.jacobian,
-            bounds=(_LOWER, _UPPER),
+            bounds=(problem.lower, problem.upper),
             method="dogbox",
             x_scale="jac",
             loss="soft_l1",
@@ -157,7 +150,7 @@ def fit_by_scipy(
         iterations += found.njev
         evaluations += found.nfev + found.njev
     seconds = time.perf_counter() - began
-    parameters = problem.parameters(np.clip(x, _LOWER, _UPPER))
+    parameters = problem.parameters(np.clip(x, problem.lower, problem.upper))
     return {
         "parameters": parameters,
         "error": _native.error_figures(measurement, parameters),
@@ -176,7 +169,9 @@ class _Problem:
         chosen = np.flatnonzero(~np.isnan(values[0]))[every // 2 :: every]
         measured = values[:, chosen]
         self.bins = chosen.size
-        self._unit = float(np.median(measured)) or float(measured.mean()) or 1.0
+        terms = _native.l1_terms(measurement)
+        self._unit, self.smoothing = terms["unit"], terms["smoothing"]
+        self.lower, self.upper = np.array(terms["lower"]), np.array(terms["upper"])
         self._measured = measured / self._unit
         h, d, p = np.unravel_index(chosen, measurement.values.shape[1:])
         theta_h, theta_d = np.radians((h + 0.5) ** 2 / 90), np.radians(d + 0.5)

@@ -1,4 +1,4 @@
-// Tables at the end of what a fit may meet, for extremes_test.cpp and ./dev bench extremes.
+// Tables of known lobes, and tables at the end of what a fit may meet.
 #pragma once
 
 #include <functional>
@@ -30,6 +30,8 @@ Measurement no_valid_bin();
 // reflects as much at normal incidence for s >= 1.
 Parameters lobe_of(double exponent, double interpolation, double ior);
 Measurement table_of(const Parameters& parameters);
+// Under noise of up to this part of every value, the same at every run and in all channels.
+Measurement noisy_table_of(const Parameters& parameters, double noise);
 // Of bins that `value` gives the reflectance of; negative is invalid.
 Measurement table_of(const std::function<Rgb(int h, int d, int p)>& value);
 

@@ -1,4 +1,4 @@
-#include "extreme_tables.h"
+#include "tables.h"
 
 #include <cmath>
 #include <cstdint>
@@ -184,6 +184,13 @@ Parameters lobe_of(double exponent, double interpolation, double ior) {
 Measurement table_of(const Parameters& parameters) {
   return table_of([&](int h, int d, int p) {
     return evaluate_model(parameters, Measurement::centre(h, d, p));
+  });
+}
+
+Measurement noisy_table_of(const Parameters& parameters, double noise) {
+  return Measurement::tabulate([&](const HalfDifference& at) -> Rgb {
+    const double phase = 1e4 * at.theta_h + 7e3 * at.theta_d + 3e3 * at.phi_d;
+    return evaluate_model(parameters, at) * (1 + noise * std::sin(phase));
   });
 }
 
