@@ -1,7 +1,9 @@
 #include "closures/compute_record.h"
 
 #include <chrono>
+#include <string>
 
+#include "measurement/input_error.h"
 #include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
 #include "reflectance/albedo.h"
@@ -20,6 +22,17 @@ std::shared_ptr<const Measurement> open(const MeasurementSource& source, int thr
     return std::make_shared<const Measurement>(read_measurement(*path, threads));
   }
   return std::get<std::shared_ptr<const Measurement>>(source);
+}
+
+// fit_model, whose errors here name the source.
+Fit fit_named(const MeasurementSource& source, const Measurement& measurement,
+              const FitOptions& options, Monitor& monitor) {
+  try {
+    return fit_model(measurement, options, monitor);
+  } catch (const InputError& error) {
+    const auto* path = std::get_if<std::filesystem::path>(&source);
+    throw InputError((path ? path->string() : "measurement") + ": " + error.what());
+  }
 }
 
 AlbedoByViewAngle albedo_by_view_angle(const Measurement& measurement, const Parameters& parameters,
@@ -54,7 +67,7 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   contents.bins = measurement->bins();
   contents.measurement = measurement;
   contents.read_seconds = seconds_since(start);
-  contents.fit = fit_model(*measurement, options, monitor);
+  contents.fit = fit_named(source, *measurement, options, monitor);
   monitor.report("Measuring the albedo", 0.97);
   contents.albedo = albedo_by_view_angle(*measurement, contents.fit.parameters, options.threads);
   monitor.throw_if_cancelled();

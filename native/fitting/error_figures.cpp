@@ -31,14 +31,59 @@ struct Misfit {
   }
 };
 
+using Part = ErrorByAngle::Part;
+
+void add(Part& to, double weight, double misfit, double measured) {
+  to.misfit += weight * misfit;
+  to.measured += weight * measured;
+}
+
 struct Misfits {
   Misfit plain, within_80, cosine;
+  ErrorByAngle by_angle;
 
   void add(const Misfits& other) {
     plain.add(other.plain);
     within_80.add(other.within_80);
     cosine.add(other.cosine);
+    for (std::size_t h = 0; h < by_angle.half_difference.size(); ++h) {
+      add_all(by_angle.half_difference[h], other.by_angle.half_difference[h]);
+    }
+    add_all(by_angle.view, other.by_angle.view);
   }
+
+ private:
+  template <std::size_t size>
+  static void add_all(std::array<Part, size>& to, const std::array<Part, size>& from) {
+    for (std::size_t i = 0; i < size; ++i) lobefit::add(to[i], 1, from[i].misfit, from[i].measured);
+  }
+};
+
+// The steps of ErrorByAngle::view that the two directions of a folded bin are in, as phi_d goes
+// from 0 to 90 deg: the lower of them rises and the higher one sinks.
+class ViewSteps {
+ public:
+  void move_to(double lower_cosine, double higher_cosine) {
+    while (lower_ > 0 && lower_cosine > cosines()[lower_]) --lower_;
+    while (higher_ + 1 < ErrorByAngle::views && higher_cosine <= cosines()[higher_ + 1]) ++higher_;
+  }
+  std::size_t lower() const { return lower_; }
+  std::size_t higher() const { return higher_; }
+
+ private:
+  // Where each step begins.
+  static const std::array<double, ErrorByAngle::views>& cosines() {
+    static const auto table = [] {
+      std::array<double, ErrorByAngle::views> cosines;
+      for (std::size_t i = 0; i < cosines.size(); ++i) {
+        cosines[i] = std::cos(radians(90.0 * static_cast<double>(i) / ErrorByAngle::views));
+      }
+      return cosines;
+    }();
+    return table;
+  }
+
+  std::size_t lower_ = ErrorByAngle::views - 1, higher_ = 0;
 };
 
 // A row of folded bins is padded to what the kernel takes at once.
@@ -48,8 +93,8 @@ using Row = Eigen::Array<double, (folded_phi_bins + 3) / 4 * 4, 1>;
 // The model and what its misfit weighs on the folded bins of one theta_h and theta_d.
 struct FoldedRow {
   std::array<Row, 3> model;
-  Row lower_cosine;  // of light and viewer
-  Row weight;        // solid angle and both cosines
+  Row lower_cosine, higher_cosine;  // of light and viewer
+  Row weight;                       // solid angle and both cosines
 };
 
 class RowFiller {
@@ -81,7 +126,8 @@ class RowFiller {
           lobe_.diffuse[c] / pi + lobe_.specular[c] * fresnel * power;
     }
     row.lower_cosine = along - across * cos_phi_;
-    row.weight = t_.solid_angle(h, d) * row.lower_cosine * (along + across * cos_phi_);
+    row.higher_cosine = along + across * cos_phi_;
+    row.weight = t_.solid_angle(h, d) * row.lower_cosine * row.higher_cosine;
     return row;
   }
 
@@ -91,25 +137,49 @@ class RowFiller {
   Row cos_phi_;
 };
 
-Misfits misfits_of_row(const Measurement& measurement, const RowFiller& fill, int h) {
+// `share` is what a bin counts; of 1 / bins, so that no sum is larger than the largest value.
+Misfits misfits_of_row(const Measurement& measurement, const RowFiller& fill, int h, double share) {
   static const double cos_80 = std::cos(radians(80));
+  constexpr int bins_of_cell = Measurement::theta_h_bins / ErrorByAngle::cells;
+  static_assert(Measurement::theta_d_bins == Measurement::theta_h_bins);
   Misfits sums;
+  auto& cells = sums.by_angle.half_difference[static_cast<std::size_t>(h / bins_of_cell)];
   for (int d = 0; d < Measurement::theta_d_bins; ++d) {
     const FoldedRow row = fill(h, d);
     const double* const values = measurement.planes().data() + Measurement::index(h, d, 0);
+    Misfit plain;
+    ViewSteps step;
     for (int p = 0; p < folded_phi_bins; ++p) {
+      Misfit both;
       for (const int bin : {p, Measurement::phi_d_bins - 1 - p}) {
         if (std::isnan(values[bin])) continue;
         const Rgb measured(values[bin], values[bin + Measurement::bin_count],
                            values[bin + 2 * Measurement::bin_count]);
-        const Rgb error = (Rgb(row.model[0][p], row.model[1][p], row.model[2][p]) - measured).abs();
-        sums.plain.add(1, error, measured);
-        if (row.lower_cosine[p] > cos_80) sums.within_80.add(1, error, measured);
-        sums.cosine.add(row.weight[p], error, measured);
+        both.add(share, (Rgb(row.model[0][p], row.model[1][p], row.model[2][p]) - measured).abs(),
+                 measured);
+      }
+      plain.add(both);
+      if (row.lower_cosine[p] > cos_80) sums.within_80.add(both);
+      sums.cosine.add(row.weight[p], both.error, both.mass);
+      step.move_to(row.lower_cosine[p], row.higher_cosine[p]);
+      for (const std::size_t view : {step.lower(), step.higher()}) {
+        add(sums.by_angle.view[view], row.weight[p] / 2, both.error.sum(), both.mass.sum());
       }
     }
+    sums.plain.add(plain);
+    add(cells[static_cast<std::size_t>(d / bins_of_cell)], 1, plain.error.sum(), plain.mass.sum());
   }
   return sums;
+}
+
+ErrorByAngle relative(ErrorByAngle parts, double plain_mass, double cosine_mass) {
+  const auto divide = [](auto& row, double mass) {
+    for (Part& part : row)
+      part = mass > 0 ? Part{part.misfit / mass, part.measured / mass} : Part{};
+  };
+  for (auto& row : parts.half_difference) divide(row, plain_mass);
+  divide(parts.view, cosine_mass);
+  return parts;
 }
 
 }  // namespace
@@ -118,16 +188,17 @@ ErrorFigures error_figures(const Measurement& measurement, const Parameters& par
                            int threads) {
   std::vector<Misfits> rows(Measurement::theta_h_bins);
   const RowFiller fill(parameters);
+  const double share = 1.0 / std::max(measurement.bins().valid, 1);
   parallel_for(Measurement::theta_h_bins, threads, [&](int h) {
-    rows[static_cast<std::size_t>(h)] = misfits_of_row(measurement, fill, h);
+    rows[static_cast<std::size_t>(h)] = misfits_of_row(measurement, fill, h, share);
   });
   Misfits total;
   for (const Misfits& row : rows) total.add(row);
-  const double bins = std::max(measurement.bins().valid, 1);
-  return {{total.plain.error.sum() / (3 * bins), total.plain.error / bins},
+  return {{total.plain.error.mean(), total.plain.error},
           total.plain.relative(),
           total.within_80.relative(),
-          total.cosine.relative()};
+          total.cosine.relative(),
+          relative(total.by_angle, total.plain.mass.sum(), total.cosine.mass.sum())};
 }
 
 }  // namespace lobefit

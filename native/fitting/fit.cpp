@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 #include "fitting/minimise.h"
@@ -11,6 +12,7 @@
 #include "fitting/samples.h"
 #include "fitting/scan.h"
 #include "fitting/variables.h"
+#include "measurement/input_error.h"
 #include "measurement/parallel.h"
 
 namespace lobefit {
@@ -49,26 +51,61 @@ class Fitter {
         variables_(options.kind, options.fresnel, options.separate_channels),
         all_(all_samples(measurement, options)),
         some_(subsample(all_, finalist_samples, threads_)),
-        few_(every_nth(some_, finalists_to_candidates)) {}
+        few_(every_nth(some_, finalists_to_candidates)) {
+    if (valid_samples() == 0) {
+      std::ostringstream message;
+      message << "expected reflectances within " << options.max_angle_degrees
+              << " degrees of the normal, found no valid bin.";
+      throw InputError(message.str());
+    }
+  }
 
   Fit run() {
     const Stopwatch start_watch;
     monitor_.report(scan_stage, 0.1);
-    std::vector<Candidate> starts = scan_shapes(every_nth(few_, candidates_to_scan), variables_,
-                                                options_.norm, max_candidates, threads_, monitor_);
+    const std::vector<Candidate> starts = find_starts();
     fit_.start_seconds = start_watch.seconds();
     const Stopwatch fit_watch;
-    const VectorXd x = options_.schedule == Schedule::stages ? run_stages(starts.front().x)
-                                                             : run_polish(std::move(starts));
+    const VectorXd x = run_schedule(starts);
     fit_.fit_seconds = fit_watch.seconds();
     fit_.parameters = variables_.to_parameters(x, all_.unit);
+    if (options_.uncertainty) {
+      monitor_.report("Fitting without each part of the data", 0.85);
+      fit_.uncertainty = jackknife(some_, variables_, options_.norm, x, threads_, monitor_);
+    }
     monitor_.report("Measuring the error", 0.95);
     fit_.errors = error_figures(measurement_, fit_.parameters, threads_);
     name_degenerate(x);
     return std::move(fit_);
   }
 
+  Parameters best_start() const {
+    return variables_.to_parameters(find_starts().front().x, all_.unit);
+  }
+
  private:
+  std::vector<Candidate> find_starts() const {
+    return scan_shapes(every_nth(few_, candidates_to_scan), variables_, options_.norm,
+                       max_candidates, threads_, monitor_);
+  }
+
+  VectorXd run_schedule(const std::vector<Candidate>& starts) {
+    switch (options_.schedule) {
+      case Schedule::stages:
+        return run_stages(starts.front().x);
+      case Schedule::joint:
+        monitor_.report("Fitting on all bins", 0.3);
+        return run_stage("all parameters on all bins", variables_.all(), starts.front().x,
+                         fine_precision())
+            .x;
+      case Schedule::subsample:
+        return run_subsample(starts);
+      case Schedule::polish:
+        break;
+    }
+    return run_polish(starts);
+  }
+
   VectorXd run_stages(VectorXd x) {
     const std::pair<const char*, std::vector<int>> stages[] = {
         {"(i) rho_d, k_s", variables_.reflectances()},
@@ -83,20 +120,42 @@ class Fitter {
     return x;
   }
 
-  VectorXd run_polish(std::vector<Candidate> candidates) {
+  // Polish from the starts on a subsample, and of the best of these on a larger one; the error that
+  // it leaves over all bins is not known then.
+  VectorXd run_on_subsample(const std::vector<Candidate>& candidates) {
     const Stopwatch watch;
+    Stage stage{"polish of " + std::to_string(candidates.size()) +
+                    " starts on a subsample, then of the best on a larger one",
+                0,
+                0,
+                0,
+                some_.size(),
+                0};
     monitor_.report("Trying the starts", 0.3);
-    std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision());
+    std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision(), stage);
     judge_certainty(minima);
     monitor_.report("Trying the best of them", 0.5);
     minima.resize(std::min(minima.size(), max_finalists));
-    const std::vector<Minimum> finalists = polish(some_, starts_of(minima), finishing_precision());
-    fit_.stages.push_back({"polish of " + std::to_string(candidates.size()) +
-                               " starts on a subsample, then of the best on a larger one",
-                           0, watch.seconds(), iterations_of(minima) + iterations_of(finalists)});
+    const std::vector<Minimum> finalists =
+        polish(some_, starts_of(minima), finishing_precision(), stage);
+    fit_.converged = finalists.front().converged;
+    stage.seconds = watch.seconds();
+    fit_.stages.push_back(stage);
+    return finalists.front().x;
+  }
+
+  VectorXd run_subsample(const std::vector<Candidate>& candidates) {
+    const VectorXd x = run_on_subsample(candidates);
+    constexpr double smoothing = 1;  // which the true value does not have
+    const Objective all(all_, variables_, options_.norm, smoothing, threads_);
+    fit_.stages.front().error = mean_error(all.evaluate(x).true_value);
+    return x;
+  }
+
+  VectorXd run_polish(const std::vector<Candidate>& candidates) {
+    const VectorXd x = run_on_subsample(candidates);
     monitor_.report("Polishing on all bins", 0.6);
-    const Minimum last =
-        run_stage("polish on all bins", variables_.all(), finalists.front().x, last_precision());
+    const Minimum last = run_stage("polish on all bins", variables_.all(), x, last_precision());
     // What the starts came to over all bins is where the last polish began.
     fit_.stages.front().error = mean_error(last.start_value);
     return last.x;
@@ -109,11 +168,6 @@ class Fitter {
     return points;
   }
 
-  static int iterations_of(const std::vector<Minimum>& minima) {
-    return std::accumulate(minima.begin(), minima.end(), 0,
-                           [](int sum, const Minimum& m) { return sum + m.iterations; });
-  }
-
   // All variables, but for a start whose alpha is 0 or 1: it stays there until the polish on all
   // bins, so that the result is no worse than the pure Phong or Blinn-Phong lobe. For s near 0 the
   // objective jumps where bins leave the lobe, and a subsample sees too few of those.
@@ -124,15 +178,19 @@ class Fitter {
     return free;
   }
 
-  // The minima on a subsample from all starts, best first.
+  // The minima on a subsample from all starts, best first; what they took is added to the stage.
   std::vector<Minimum> polish(const Samples& samples, const std::vector<VectorXd>& starts,
-                              const Precision& precision) const {
+                              const Precision& precision, Stage& stage) const {
     std::vector<Minimum> minima(starts.size());
     parallel_for(static_cast<int>(starts.size()), threads_, [&](int i) {
       const auto at = static_cast<std::size_t>(i);
       minima[at] = minimise(samples, variables_, options_.norm, movable(starts[at]), starts[at],
                             precision, 1, monitor_);
     });
+    for (const Minimum& minimum : minima) {
+      stage.iterations += minimum.iterations;
+      stage.touched += minimum.passes * static_cast<double>(samples.size());
+    }
     std::stable_sort(minima.begin(), minima.end(), [](const Minimum& left, const Minimum& right) {
       return left.true_value < right.true_value;
     });
@@ -145,8 +203,9 @@ class Fitter {
     Minimum minimum =
         minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_);
     fit_.converged = minimum.converged;
-    fit_.stages.push_back(
-        {name, mean_error(minimum.true_value), watch.seconds(), minimum.iterations});
+    fit_.stages.push_back({name, mean_error(minimum.true_value), watch.seconds(),
+                           minimum.iterations, all_.size(),
+                           minimum.passes * static_cast<double>(all_.size())});
     return minimum;
   }
 
@@ -174,8 +233,19 @@ class Fitter {
     fit_.certainty.spread = best > 0 ? (worst - best) / best : 0;
   }
 
+  std::ptrdiff_t valid_samples() const {
+    return std::count_if(all_.weight.begin(), all_.weight.end(), [](float w) { return w > 0; });
+  }
+
   void name_degenerate(const VectorXd& x) {
     const auto warn = [&](const char* sentence) { fit_.warnings.emplace_back(sentence); };
+    if (valid_samples() < variables_.count()) {
+      warn("The measurement has fewer valid bins than the model has parameters.");
+    }
+    constexpr double black = 0.999;  // black itself has the relative error 1
+    if (std::min(fit_.errors.relative_l1.pooled, fit_.errors.relative_l1_cosine.pooled) > black) {
+      warn("The fit is no closer to the measurement than black is.");
+    }
     const bool no_specular = !(x.segment<3>(Variables::specular).maxCoeff() > 0);
     if (no_specular) {
       warn(
@@ -215,6 +285,10 @@ class Fitter {
 
 Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor) {
   return Fitter(measurement, options, monitor).run();
+}
+
+Parameters best_start(const Measurement& measurement, const FitOptions& options, Monitor& monitor) {
+  return Fitter(measurement, options, monitor).best_start();
 }
 
 }  // namespace lobefit

@@ -1,10 +1,12 @@
 // The fit of a model to a measurement.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fitting/error_figures.h"
+#include "fitting/jackknife.h"
 #include "fitting/monitor.h"
 #include "fitting/options.h"
 #include "measurement/measurement.h"
@@ -19,6 +21,8 @@ struct Stage {
   double error;
   double seconds;
   int iterations;
+  std::size_t samples;  // in the largest set that it went over
+  double touched;       // samples of all its passes together
 };
 
 // How sure the result is: of the `starts` that were polished on a subsample, `agree` ended within
@@ -36,12 +40,16 @@ struct Fit {
   double start_seconds = 0, fit_seconds = 0;
   bool converged = false;
   Certainty certainty;
-  std::vector<std::string> warnings;  // what is degenerate in the result, a sentence each
+  std::optional<Uncertainty> uncertainty;  // where the options ask for it
+  std::vector<std::string> warnings;       // what is degenerate in the result, a sentence each
 };
 
-// Starts come from the data (scan_shapes). Schedule::stages then runs the paper's three stages on
-// all bins from the best of them; Schedule::polish runs stages and joint polish from each of them
-// on a subsample, and polishes the best on all bins. Throws Cancelled.
+// Starts come from the data (scan_shapes); what follows is the Schedule's. Throws Cancelled, and
+// InputError (of a sentence that does not name the measurement) where no valid bin is within the
+// angle asked for.
 Fit fit_model(const Measurement& measurement, const FitOptions& options, Monitor& monitor);
+
+// The best of the starts. Throws as fit_model.
+Parameters best_start(const Measurement& measurement, const FitOptions& options, Monitor& monitor);
 
 }  // namespace lobefit

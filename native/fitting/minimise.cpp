@@ -73,16 +73,20 @@ void solve(const Objective& objective, const std::vector<int>& moved, const Prec
   minimum.x = cost.within_bounds(values.data());
 }
 
-// One level: solves, and again as long as variables meet their bounds or come free of them.
+// One level: solves, and again as long as variables meet their bounds or come free of them. Where
+// the lobe is a ridge of s and k_s, or half of the values are spikes, every solve may use up its
+// iterations and still gain: after so many in all the level is as good as it gets.
 void solve_level(const Objective& objective, const std::vector<int>& free,
                  const Precision& precision, const Monitor& monitor, Minimum& minimum) {
-  constexpr int max_rounds = 30;
+  constexpr int max_rounds = 30, max_full_solves = 3;
+  const int last_iteration = minimum.iterations + max_full_solves * precision.iterations;
   std::vector<int> moved;
-  for (int round = 0; round < max_rounds; ++round) {
+  for (int round = 0; round < max_rounds && minimum.iterations < last_iteration; ++round) {
     monitor.throw_if_cancelled();
     const VectorXd gradient = objective.evaluate(minimum.x, Curvature::newton).gradient;
     std::vector<int> now = movable(objective.variables(), free, minimum.x, gradient);
-    if (now.empty() || (minimum.converged && now == moved)) return;
+    minimum.converged |= now.empty();
+    if (minimum.converged && (now.empty() || now == moved)) return;
     moved = std::move(now);
     solve(objective, moved, precision, monitor, minimum);
   }
@@ -101,7 +105,7 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const VectorXd& x, const Precision& precision,
                  int threads, const Monitor& monitor) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
-  Minimum best{variables.clamp(x), unknown, unknown, 0, false};
+  Minimum best{variables.clamp(x), unknown, unknown, 0, 0, false};
   Minimum current = best;
   const std::size_t levels = has_smoothing(norm) ? precision.smoothing.size() : 1;
   for (std::size_t level = 0; level < levels; ++level) {
@@ -114,7 +118,9 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
     current.true_value = objective.evaluate(current.x, Curvature::newton).true_value;
     const double gain = best.true_value - current.true_value;
     if (gain > 0) best = current;
+    current.passes += objective.passes();
     best.iterations = current.iterations;
+    best.passes = current.passes;
     if (gain < 1e-6 * best.true_value && level > 0) break;
   }
   return best;

@@ -16,6 +16,7 @@ struct Minimum {
   double true_value = 0;   // Evaluation::true_value there
   double start_value = 0;  // and where it began
   int iterations = 0;
+  int passes = 0;  // over the samples
   bool converged = false;
 };
 

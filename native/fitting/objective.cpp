@@ -178,6 +178,7 @@ const Evaluation& Objective::evaluate(const VectorXd& x, Curvature curvature) co
 }
 
 Evaluation Objective::pass(const VectorXd& x, Curvature curvature) const {
+  ++passes_;
   const Assembly assembly(variables_, x);
   const int groups = assembly.groups(), runs = static_cast<int>(samples_.runs.size());
   std::vector<KernelSums> sums(static_cast<std::size_t>(runs * groups));

@@ -42,6 +42,8 @@ class Objective {
 
   const Variables& variables() const { return variables_; }
   double smoothing() const { return smoothing_; }
+  // How many passes were made.
+  int passes() const { return passes_; }
 
  private:
   Evaluation pass(const Eigen::VectorXd& x, Curvature curvature) const;
@@ -58,6 +60,7 @@ class Objective {
     Evaluation evaluation;
   };
   mutable std::array<Answer, 2> answers_;  // the latest first
+  mutable int passes_ = 0;
 };
 
 }  // namespace lobefit

@@ -15,9 +15,11 @@ constexpr std::array<std::pair<Norm, std::string_view>, 4> norm_names = {{
     {Norm::l2, "l2"},
     {Norm::log_l2, "log-l2"},
 }};
-constexpr std::array<std::pair<Schedule, std::string_view>, 2> schedule_names = {{
+constexpr std::array<std::pair<Schedule, std::string_view>, 4> schedule_names = {{
     {Schedule::stages, "stages"},
     {Schedule::polish, "polish"},
+    {Schedule::joint, "joint"},
+    {Schedule::subsample, "subsample"},
 }};
 
 template <typename Names, typename Value>

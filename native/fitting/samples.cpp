@@ -12,26 +12,16 @@ namespace {
 
 constexpr int folded_phi_bins = Measurement::folded_phi_bins;
 
-// The median of the finite values of all channels, found from one in `stride`, or something
-// positive in its place: values of a table that is mostly zero are measured by their mean, those of
-// an all-zero one by 1. It is a unit alone, so that a few thousand values tell it well enough.
-double typical_reflectance(const Measurement& measurement, std::size_t stride = 61) {
-  constexpr std::size_t enough = 1000;
-  const auto planes = measurement.planes();
-  std::vector<double> values;
-  double sum = 0;
-  for (std::size_t i = 0; i < planes.size(); i += stride) {
-    if (std::isnan(planes[i])) continue;
-    values.push_back(planes[i]);
-    sum += planes[i];
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() >= enough && *middle > 0) return *middle;
-  if (stride > 1) return typical_reflectance(measurement, 1);
-  if (values.empty()) return 1;
-  if (*middle > 0) return *middle;
-  return sum > 0 ? sum / static_cast<double>(values.size()) : 1;
+// Values of more units than this are no lobe's but damage, and are cut: in single precision their
+// squares, and the sums of these, stay finite.
+constexpr double most_units = 1e15;
+
+// The value that a share of them is below; reorders them.
+double quantile(std::vector<double>& values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 // Calls visit(column) for every column; columns differ in type.
@@ -157,7 +147,7 @@ class Builder {
   }
 
   float stored(double reflectance) const {
-    const double value = reflectance / samples_.unit;
+    const double value = std::min(reflectance / samples_.unit, most_units);
     return static_cast<float>(norm_ == Norm::log_l2 ? std::log(value + log_offset) : value);
   }
 
@@ -183,6 +173,26 @@ void measure_importance(const Samples& samples, const Samples::Run& run, float* 
 
 }  // namespace
 
+double typical_reflectance(const Measurement& measurement, std::size_t stride) {
+  constexpr std::size_t enough = 1000;
+  constexpr double next_to_nothing = 1e-12;
+  const auto planes = measurement.planes();
+  std::vector<double> values;
+  for (std::size_t i = 0; i < planes.size(); i += stride) {
+    if (!std::isnan(planes[i])) values.push_back(planes[i]);
+  }
+  if (values.size() < enough && stride > 1) return typical_reflectance(measurement, 1);
+  if (values.empty()) return 1;
+  const double bright = quantile(values, 0.999), median = quantile(values, 0.5);
+  if (median > next_to_nothing * bright) return median;
+  if (stride > 1) return typical_reflectance(measurement, 1);
+  double mean = 0;
+  for (const double value : values) {
+    mean += std::min(value, bright / next_to_nothing) / static_cast<double>(values.size());
+  }
+  return mean > 0 ? mean : 1;
+}
+
 Samples all_samples(const Measurement& measurement, const FitOptions& options) {
   return Builder(measurement, options).build();
 }
@@ -199,17 +209,19 @@ Samples subsample(const Samples& all, std::size_t count, int threads) {
                         from + static_cast<std::ptrdiff_t>(run.end), 0.0);
   });
   const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
+  const auto size = static_cast<double>(std::max<std::size_t>(all.size(), 1));
   // A small even share keeps every weight bounded: a bin at the median must not be impossible.
-  const double even = 0.1 * sum / static_cast<double>(std::max<std::size_t>(all.size(), 1));
+  // Where every bin is at the median it is all there is.
+  const double even = sum > 0 ? 0.1 * sum / size : 1;
   Samples drawn;
   drawn.unit = all.unit;
-  const double per_draw = 1.1 * sum / static_cast<double>(count);
+  const double per_draw = (sum > 0 ? 1.1 * sum : size) / static_cast<double>(count);
   double until_next = 0.5;
   for (const Samples::Run& run : all.runs) {
     begin_run(drawn, run.cos_theta_d);
     for (std::size_t i = run.begin; i < run.end; ++i) {
       if (!(all.weight[i] > 0)) continue;
-      const double expected = per_draw > 0 ? (chance[i] + even) / per_draw : 1;
+      const double expected = (chance[i] + even) / per_draw;
       until_next -= expected;
       if (until_next >= 0) continue;
       const double draws = std::ceil(-until_next);

@@ -41,7 +41,7 @@ using SampleColumn = std::vector<T, UntouchedMemory<T>>;
 //
 // Samples of one theta_d stand together in a run, because the Fresnel reflectance is the same for
 // all of them; a run is padded with samples of weight 0 to a multiple of `padding`. Values are in
-// units of the median reflectance.
+// units of the median reflectance, or of the mean where the median is next to nothing.
 struct Samples {
   static constexpr std::size_t padding = 4;
   struct Run {
@@ -55,10 +55,15 @@ struct Samples {
   SampleColumn<float> weight;  // of each of the two measured values
   // measured[channel][half]: f, or log(f + log_offset) for Norm::log_l2.
   std::array<std::array<SampleColumn<float>, 2>, 3> measured;
-  double unit = 1;  // the median reflectance, in 1/sr
+  double unit = 1;  // in 1/sr
 
   std::size_t size() const { return weight.size(); }
 };
+
+// The unit of the values: the median of the valid ones of all channels, found from one in `stride`,
+// which tell it well enough. Where it is next to nothing beside the brightest (a lobe on black) it
+// is their mean, to which a few damaged bins add little; of an all-zero table it is 1.
+double typical_reflectance(const Measurement& measurement, std::size_t stride = 61);
 
 // All bins above the horizon and up to options.max_angle_degrees; invalid ones weigh 0.
 Samples all_samples(const Measurement& measurement, const FitOptions& options);

@@ -14,12 +14,17 @@ namespace {
 
 using Eigen::VectorXd;
 
-// Log s from .1 to 3e5 in thirds of a decade; alpha; eta - 1 from a weak dielectric to a metal.
-constexpr int exponent_steps = 20, steps_a_decade = 3;
+// s from .1 to 3e5 in thirds of a decade, and one that lights little more than the first theta_h;
+// alpha; eta - 1 from a weak dielectric to a mirror at all angles.
+constexpr int exponent_steps = 21, steps_a_decade = 3;
+constexpr double sharpest = 1e7;
 constexpr std::array<double, 5> interpolations = {0, 0.25, 0.5, 0.75, 1};
-constexpr std::array<double, 4> excess_iors = {0.15, 0.5, 1.5, 6};
+constexpr std::array<double, 5> excess_iors = {0.15, 0.5, 1.5, 6, 60};
 
-double log_exponent_at(int step) { return std::log(10) * (double(step) / steps_a_decade - 1); }
+double log_exponent_at(int step) {
+  if (step == exponent_steps - 1) return std::log(sharpest);
+  return std::log(10) * (double(step) / steps_a_decade - 1);
+}
 
 // The columns of the grid: one for every (alpha, eta) that the model has.
 struct Grid {

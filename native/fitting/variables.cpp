@@ -55,6 +55,23 @@ std::vector<int> Variables::shape_and_specular() const {
   return indices;
 }
 
+std::vector<std::string> Variables::names() const {
+  std::vector<std::string> names;
+  const auto add_channels = [&](const std::string& name) {
+    for (const char* channel : {" red", " green", " blue"}) names.push_back(name + channel);
+  };
+  add_channels("diffuse");
+  add_channels("specular");
+  if (exponents_ == 3) {
+    add_channels("exponent");
+  } else {
+    names.emplace_back("exponent");
+  }
+  if (interpolation_ >= 0) names.emplace_back("interpolation");
+  if (log_excess_ior_ >= 0) names.emplace_back("ior");
+  return names;
+}
+
 Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const {
   Parameters parameters;
   parameters.kind = kind_;
@@ -66,6 +83,16 @@ Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const
   if (interpolation_ >= 0) parameters.interpolation = x[interpolation_];
   if (log_excess_ior_ >= 0) parameters.ior = 1 + std::exp(x[log_excess_ior_]);
   return parameters;
+}
+
+Eigen::VectorXd Variables::from_parameters(const Parameters& parameters, double unit) const {
+  Eigen::VectorXd x(count());
+  x.segment<3>(diffuse) = parameters.diffuse / (unit * pi);
+  x.segment<3>(specular) = parameters.specular / unit;
+  x.segment(log_exponent, exponents_) = parameters.exponent.head(exponents_).log();
+  if (interpolation_ >= 0) x[interpolation_] = parameters.interpolation;
+  if (log_excess_ior_ >= 0) x[log_excess_ior_] = std::log(parameters.ior.value() - 1);
+  return clamp(x);
 }
 
 }  // namespace lobefit

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "fitting/options.h"
@@ -35,8 +36,14 @@ class Variables {
   std::vector<int> shape() const;               // stage (ii)
   std::vector<int> shape_and_specular() const;  // stage (iii)
 
+  // "diffuse red", .., "specular red", .., "exponent" (or "exponent red", ..), "interpolation",
+  // "ior".
+  std::vector<std::string> names() const;
+
   // `unit` is the median reflectance in 1/sr.
   Parameters to_parameters(const Eigen::VectorXd& x, double unit) const;
+  // Its inverse, within the bounds.
+  Eigen::VectorXd from_parameters(const Parameters& parameters, double unit) const;
 
  private:
   ModelKind kind_;

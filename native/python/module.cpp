@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -20,10 +21,17 @@
 #include "closures/fit_closures.h"
 #include "closures/live_lobe.h"
 #include "closures/principled.h"
+#include "fitting/error_figures.h"
+#include "fitting/fit.h"
 #include "fitting/job.h"
+#include "fitting/minimise.h"
+#include "fitting/naive_ceres.h"
+#include "fitting/samples.h"
+#include "fitting/variables.h"
 #include "measurement/input_error.h"
 #include "measurement/measurement.h"
 #include "measurement/merl.h"
+#include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
@@ -180,6 +188,55 @@ py::dict to_dict(const ErrorFigures& errors) {
                   "relative_l1_cosine"_a = to_dict(errors.relative_l1_cosine));
 }
 
+// The ends of `count` steps from 0 to 90 deg, the first one's beginning too; `power` 2 makes them
+// grow as the bins of theta_h do.
+std::vector<double> angles_between(int count, int power) {
+  std::vector<double> ends;
+  for (int i = 0; i <= count; ++i) ends.push_back(90 * std::pow(double(i) / count, power));
+  return ends;
+}
+
+template <typename Parts>
+std::pair<py::list, py::list> columns_of(const Parts& parts) {
+  py::list misfit, measured;
+  for (const ErrorByAngle::Part& part : parts) {
+    misfit.append(part.misfit);
+    measured.append(part.measured);
+  }
+  return {misfit, measured};
+}
+
+py::dict to_dict(const ErrorByAngle& errors) {
+  using namespace py::literals;
+  py::list misfit, measured;
+  for (const auto& row : errors.half_difference) {
+    const auto [row_misfit, row_measured] = columns_of(row);
+    misfit.append(row_misfit);
+    measured.append(row_measured);
+  }
+  const auto [view_misfit, view_measured] = columns_of(errors.view);
+  return py::dict(
+      "half_difference"_a = py::dict("theta_h"_a = angles_between(ErrorByAngle::cells, 2),
+                                     "theta_d"_a = angles_between(ErrorByAngle::cells, 1),
+                                     "misfit"_a = misfit, "measured"_a = measured),
+      "view"_a = py::dict("view_angle"_a = angles_between(ErrorByAngle::views, 1),
+                          "misfit"_a = view_misfit, "measured"_a = view_measured));
+}
+
+py::dict to_dict(const Uncertainty& uncertainty, const FitOptions& options) {
+  using namespace py::literals;
+  py::list correlation;
+  for (const auto& row : uncertainty.correlation.rowwise()) {
+    correlation.append(std::vector<double>(row.begin(), row.end()));
+  }
+  return py::dict(
+      "confidence"_a = Uncertainty::confidence, "blocks"_a = uncertainty.blocks,
+      "seconds"_a = uncertainty.seconds, "low"_a = to_dict(uncertainty.low),
+      "high"_a = to_dict(uncertainty.high), "undetermined"_a = uncertainty.undetermined,
+      "variables"_a = Variables(options.kind, options.fresnel, options.separate_channels).names(),
+      "correlation"_a = correlation);
+}
+
 py::list to_list(const std::vector<Stage>& stages) {
   using namespace py::literals;
   py::list list;
@@ -202,7 +259,10 @@ py::dict to_dict(const RecordContents& contents, const FitOptions& options) {
   const Certainty& certainty = fit.certainty;
   return py::dict(
       "model"_a = std::string(name_of(options.kind)), "parameters"_a = to_dict(fit.parameters),
-      "error"_a = to_dict(fit.errors), "schedule"_a = std::string(name_of(options.schedule)),
+      "error"_a = to_dict(fit.errors), "error_by_angle"_a = to_dict(fit.errors.by_angle),
+      "uncertainty"_a =
+          fit.uncertainty ? py::object(to_dict(*fit.uncertainty, options)) : py::object(py::none()),
+      "schedule"_a = std::string(name_of(options.schedule)),
       "norm"_a = std::string(name_of(options.norm)),
       "channels"_a = options.separate_channels ? "separate" : "shared",
       "max_angle"_a = options.max_angle_degrees, "stages"_a = to_list(fit.stages),
@@ -332,7 +392,7 @@ struct PythonJob {
 std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string& model,
                                      bool fresnel, const std::string& schedule,
                                      const std::string& norm, double max_angle,
-                                     const std::string& channels, int threads) {
+                                     const std::string& channels, bool uncertainty, int threads) {
   FitOptions options;
   options.kind = model_named(model);
   options.fresnel = fresnel;
@@ -347,6 +407,7 @@ std::unique_ptr<PythonJob> start_job(const py::object& source, const std::string
     throw InputError("channels: expected shared or separate, found '" + channels + "'.");
   }
   options.separate_channels = channels == "separate";
+  options.uncertainty = uncertainty;
   if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
   options.threads = threads;
   if (py::isinstance<Measurement>(source)) {
@@ -373,6 +434,68 @@ std::unique_ptr<ClosureJob> start_closure_job(const py::object& source, int coun
     return count >= 0 ? fit_closures(sampled, options, monitor)
                       : fit_closures_within(sampled, tolerance, options, monitor);
   });
+}
+
+// The result of a job that Python waits for; Ctrl-C ends it.
+template <typename Result>
+Result finished(std::function<Result(Monitor&)> work) {
+  Job<Result> job(std::move(work));
+  const auto wait = [&job] {
+    const py::gil_scoped_release release;
+    return job.wait(std::chrono::milliseconds(50));
+  };
+  while (!wait()) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+  return job.result();
+}
+
+py::dict l1_terms(const Measurement& measurement) {
+  using namespace py::literals;
+  const Variables variables(ModelKind::interpolated, true, false);
+  const auto list = [](const Eigen::VectorXd& x) {
+    return std::vector<double>(x.begin(), x.end());
+  };
+  return py::dict("unit"_a = typical_reflectance(measurement),
+                  "smoothing"_a = fine_precision().smoothing.back(),
+                  "lower"_a = list(variables.lower()), "upper"_a = list(variables.upper()));
+}
+
+Parameters start_of(const SharedMeasurement& measurement, int threads) {
+  return finished<Parameters>(
+      [=](Monitor& monitor) { return best_start(*measurement, {.threads = threads}, monitor); });
+}
+
+py::dict fit_by(const SharedMeasurement& measurement, const std::string& schedule, int threads) {
+  using namespace py::literals;
+  const FitOptions options{.schedule = schedule_named(schedule), .threads = threads};
+  const Fit fit =
+      finished<Fit>([=](Monitor& monitor) { return fit_model(*measurement, options, monitor); });
+  int iterations = 0;
+  double touched = 0;
+  for (const Stage& stage : fit.stages) {
+    iterations += stage.iterations;
+    touched += stage.touched;
+  }
+  // A sample is two bins, but for the few whose other half is invalid.
+  const auto bins =
+      std::min(static_cast<int>(2 * fit.stages.back().samples), measurement->bins().valid);
+  return py::dict("parameters"_a = to_dict(fit.parameters), "error"_a = to_dict(fit.errors),
+                  "bins"_a = bins, "iterations"_a = iterations, "touched"_a = 2 * touched);
+}
+
+py::dict fit_naively_by(const SharedMeasurement& measurement, const py::dict& start, int every,
+                        int threads) {
+  using namespace py::literals;
+  if (every < 1) throw InputError("every: expected 1 (all bins) or more, found less.");
+  const NaiveFit fit = finished<NaiveFit>([&, from = parameters_from(start)](Monitor& monitor) {
+    return fit_naively(*measurement, from, every, threads, monitor);
+  });
+  return py::dict(
+      "parameters"_a = to_dict(fit.parameters),
+      "error"_a = to_dict(error_figures(*measurement, fit.parameters, thread_count(threads))),
+      "bins"_a = fit.bins, "iterations"_a = fit.iterations,
+      "touched"_a = static_cast<double>(fit.passes) * fit.bins, "seconds"_a = fit.seconds);
 }
 
 template <typename Owner>
@@ -430,7 +553,8 @@ void bind_jobs(py::module_& module) {
   py::class_<PythonJob> fit(module, "FitJob", "A fit that runs in a thread of its own.");
   fit.def(py::init(&start_job), py::arg("source"), py::arg("model") = "interpolated",
           py::arg("fresnel") = true, py::arg("schedule") = "polish", py::arg("norm") = "l1",
-          py::arg("max_angle") = 90.0, py::arg("channels") = "shared", py::arg("threads") = 0,
+          py::arg("max_angle") = 90.0, py::arg("channels") = "shared",
+          py::arg("uncertainty") = false, py::arg("threads") = 0,
           "Starts at once; source is a path or a Measurement.");
   bind_job_methods(fit, [](PythonJob& p) -> RecordJob& { return p.job; });
   fit.def(
@@ -452,6 +576,34 @@ void bind_jobs(py::module_& module) {
   closures.def(
       "result", [](const ClosureJob& job) { return to_dict(job.result()); },
       "The closures as a dict; raises what ended the job.");
+}
+
+// The fit and its rivals, each waited for (lobefit.methods).
+void bind_methods(py::module_& module) {
+  module.def(
+      "best_start",
+      [](const SharedMeasurement& measurement, int threads) {
+        return to_dict(start_of(measurement, threads));
+      },
+      py::arg("measurement"), py::arg("threads") = 0,
+      "Where the fit of the interpolated model with Fresnel by L1 begins, as parameters.");
+  module.def("l1_terms", &l1_terms, py::arg("measurement"),
+             "What that fit ends on: the unit of reflectance in 1/sr and, in this unit, the "
+             "smoothing of |r| and the bounds of rho_d/pi and k_s of three channels, log s, alpha "
+             "and log(eta - 1).");
+  module.def("fit_by", &fit_by, py::arg("measurement"), py::arg("schedule"), py::arg("threads") = 0,
+             "The interpolated model with Fresnel by L1: parameters, error, bins that the last "
+             "step saw, iterations, and touched, the bins of all passes together.");
+  module.def("fit_naively", &fit_naively_by, py::arg("measurement"), py::arg("start"),
+             py::arg("every") = 1, py::arg("threads") = 0,
+             "The same by Ceres with a residual block for each channel of one in `every` bins; "
+             "also seconds, without those of the error figures.");
+  module.def(
+      "error_figures",
+      [](const Measurement& measurement, const py::dict& parameters) {
+        return to_dict(error_figures(measurement, parameters_from(parameters), thread_count(0)));
+      },
+      py::arg("measurement"), py::arg("parameters"), "The `error` of a record.");
 }
 
 void bind_errors(py::module_& module) {
@@ -514,4 +666,5 @@ PYBIND11_MODULE(_native, module) {
   lobefit::bind_measurement(module);
   lobefit::bind_jobs(module);
   lobefit::bind_functions(module);
+  lobefit::bind_methods(module);
 }

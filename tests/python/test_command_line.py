@@ -216,6 +216,23 @@ def test_a_folder_goes_on_where_it_stopped(tmp_path, table, capfd):
     assert "1 of 2 kept" in capfd.readouterr().err
     assert main([*command, "--norm", "l2", "--again"]) == 0
     assert "kept" not in capfd.readouterr().err
+    # A record without the uncertainty lacks what is asked for, one with it has more than that.
+    assert main([*command, "--norm", "l2", "--uncertainty"]) == 0
+    assert "kept" not in capfd.readouterr().err
+    assert main([*command, "--norm", "l2"]) == 0
+    assert "2 of 2 kept" in capfd.readouterr().err
+
+
+def test_info_tells_what_a_record_holds(tmp_path, table, capfd):
+    place = tmp_path / "truth.json"
+    assert main(["fit", str(table), "--uncertainty", "-o", str(place)]) == 0
+    capfd.readouterr()
+    assert main(["info", str(place)]) == 0
+    told = capfd.readouterr().out
+    for what in ("exponent", "diffuse red", " to ", "relative_l1_cosine", "albedo at", "view"):
+        assert what in told
+    assert main(["info", "--json", str(place)]) == 0
+    assert json.loads(capfd.readouterr().out)["uncertainty"]["blocks"] >= 20
 
 
 def test_a_record_cannot_be_written_onto_a_folder(tmp_path, table, capfd):

@@ -27,7 +27,7 @@ def test_all_but_blender_is_done_and_the_lack_is_named(table, tmp_path, capfd):
     out, err = capfd.readouterr()
     assert err.count("\n") == 1 and "pip install bpy" in err
     assert "truth" in out and "index.html" in out
-    names = ["index.html", "materials.png", "records", "report.csv"]
+    names = ["index.html", "materials.png", "methods.csv", "records", "report.csv"]
     assert sorted(os.listdir(tmp_path / "demo")) == names
     assert Record.load(tmp_path / "demo" / "records" / "truth.json").models
 

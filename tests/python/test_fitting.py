@@ -10,6 +10,7 @@ import lobefit
 import numpy as np
 import pytest
 from lobefit import fitting, preview
+from lobefit.command_line import main
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +97,26 @@ def test_an_exception_in_the_callback_ends_the_fit(table):
 def test_unknown_options_are_named(table, option, value):
     with pytest.raises(lobefit.InputError, match=f"expected .* found '{value}'"):
         lobefit.fit(table, **{option: value})
+
+
+def test_the_record_tells_where_the_error_stands(recovered):
+    parts = recovered.error_by_angle["half_difference"]
+    # Five digits of each of the 225 parts are kept.
+    assert np.sum(parts["measured"]) == pytest.approx(1, rel=1e-4)
+    whole = recovered.error["relative_l1"]["pooled"]
+    assert np.sum(parts["misfit"]) == pytest.approx(whole, rel=1e-4)
+    seen = recovered.error["relative_l1_cosine"]["pooled"]
+    assert sum(recovered.error_by_angle["view"]["misfit"]) == pytest.approx(seen, rel=1e-4)
+
+
+def test_uncertainty_is_found_where_it_is_asked_for(recovered, table, truth):
+    assert recovered.uncertainty is None
+    record = lobefit.fit(table, uncertainty=True)
+    assert record.uncertainty["blocks"] >= 20
+    assert record.uncertainty["undetermined"] == []
+    low, high = record.intervals["exponent"]
+    assert low <= record.parameters["exponent"] <= high < 1.1 * truth["exponent"]
+    assert record.parameters == recovered.parameters
 
 
 @pytest.fixture(scope="module")
@@ -202,3 +223,48 @@ def test_the_interface_is_typed():
         parameters = [name for name in inspect.signature(function).parameters if name != "self"]
         assert {"return", *parameters} == hints.keys()
     assert issubclass(lobefit.InputError, ValueError)
+
+
+def extreme(change, truth, tmp_path):
+    """A file of the nastiest kind, made of the table of a lobe."""
+    values = np.array(lobefit.Measurement.from_model(truth).values)
+    path = tmp_path / "extreme.binary"
+    lobefit._native.Measurement.from_values(change(values)).write(str(path))
+    return path
+
+
+def one_valid_bin(values):
+    kept = np.full_like(values, -1.0)
+    kept[:, 5, 40, 50] = values[:, 5, 40, 50]
+    return kept
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda values: 0 * values, id="all zero"),
+        pytest.param(one_valid_bin, id="one valid bin"),
+        pytest.param(lambda values: 1e30 * values, id="times 1e30"),
+        pytest.param(lambda values: 1e-30 * values, id="times 1e-30"),
+        pytest.param(lambda values: 1e-310 * values, id="denormals"),
+    ],
+)
+def test_extreme_tables_make_a_record_or_a_sentence(change, truth, tmp_path, capfd):
+    path, record = extreme(change, truth, tmp_path), tmp_path / "extreme.json"
+    assert main(["fit", str(path), "-o", str(record)]) == 0
+    fitted = lobefit.Record.load(record)
+    assert fitted.converged
+    capfd.readouterr()
+    status = main(["closures", str(record), "--closures", "1", "-o", str(record)])
+    message = capfd.readouterr().err
+    if status == 0:
+        assert len(lobefit.Record.load(record).closures) == 1
+    else:
+        assert status == 2 and message.count("\n") == 1 and message.startswith("lobefit: ")
+        assert lobefit.Record.load(record) == fitted
+
+
+def test_a_table_without_a_valid_bin_is_named():
+    black = lobefit._native.Measurement.from_values(np.full((3, 90, 90, 180), -1.0))
+    with pytest.raises(lobefit.InputError, match=r"^measurement: expected .* no valid bin\.$"):
+        lobefit.fit(black)

@@ -77,6 +77,46 @@ def closures(**changes):
     }
 
 
+def uncertainty(record):
+    return {
+        "confidence": 0.95,
+        "blocks": 25,
+        "seconds": 0.1,
+        "low": {**record.parameters, "ior": 1 + 1 / 3},
+        "high": {**record.parameters, "ior": 7 / 3},
+        "undetermined": ["ior"],
+        "variables": ["diffuse red", "ior"],
+        "correlation": [[1.0, -1 / 3], [-1 / 3, 1.0]],
+    }
+
+
+BY_ANGLE = {
+    "half_difference": {
+        "theta_h": [0.0, 30.0, 90.0],
+        "theta_d": [0.0, 90.0],
+        "misfit": [[1 / 3], [0.0]],
+        "measured": [[1 / 7], [6 / 7]],
+    },
+    "view": {"view_angle": [0.0, 90.0], "misfit": [1 / 3], "measured": [1.0]},
+}
+
+
+def test_uncertainty_and_error_by_angle_are_exact_when_read_back(record, tmp_path):
+    record.uncertainty, record.error_by_angle = uncertainty(record), BY_ANGLE
+    record.save(tmp_path / "gold.json")
+    assert Record.load(tmp_path / "gold.json") == record
+    assert record.intervals["ior"] == (4 / 3, 7 / 3)
+    assert record.intervals["diffuse red"] == (1 / 3, 1 / 3)
+    assert "--uncertainty" in record.command()
+
+
+def test_records_of_the_first_builds_are_read(record):
+    data = json.loads(record.to_json())
+    del data["uncertainty"], data["error_by_angle"]
+    old = Record.from_json(json.dumps(data))
+    assert old.uncertainty is None and old.error_by_angle is None and old.intervals == {}
+
+
 def test_closures_are_exact_when_read_back(record, tmp_path):
     record.closures = [closures(target="lobe", count=0, specular=[]), closures()]
     record.save(tmp_path / "gold.json")
@@ -139,12 +179,18 @@ def change(data, path, value):
         (["closures", 0, "specular", 0, "bend"], [], "bend to be points of rising cosine, at"),
         (["closures", 0, "specular", 0, "bend", 1, 0], 0, "bend to be points of rising cosine"),
         (["closures", 0, "specular", 0, "bend", 0], [0], "bend[0] to be a list of 2, found [0]."),
+        (["uncertainty", "undetermined"], ["k_s"], "to be one of diffuse red, ior, found"),
+        (["uncertainty", "correlation"], [[1.0]], "correlation to be a list of 2, found [[1.0]]."),
+        (["uncertainty", "low"], None, "expected uncertainty.low to be an object, found null."),
+        (["error_by_angle", "view", "misfit"], [], "view.misfit to be a list of 1, found []."),
+        (["error_by_angle", "view", "view_angle"], [0], "to be rising angles, at least two"),
         (["models"], [], "expected models to be an object, found []."),
         (["models"], {"ward": {}}, "expected the key in models to be one of modified-phong"),
     ],
 )
 def test_what_is_wrong_is_named(record, tmp_path, path, value, sentence):
     record.closures = [closures()]
+    record.uncertainty, record.error_by_angle = uncertainty(record), BY_ANGLE
     data = json.loads(record.to_json())
     change(data, path, value)
     file = tmp_path / "gold.json"

@@ -7,7 +7,9 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from lobefit import _native, pictures, read, report
+from lobefit import _native, angles, fit, pictures, read, report
+from lobefit.heat_map import color_of, heat_map
+from lobefit.methods import Trial
 from lobefit.pictures import Picture
 from lobefit.plot import Line, plot
 
@@ -61,6 +63,34 @@ def test_a_plot_of_nothing_is_empty():
     assert plot([Line("one", [0, 1], [None, None], "#000")], "x", "y") == ""
 
 
+def test_the_page_shows_curves_maps_and_intervals(table, tmp_path):
+    record = fit(table, uncertainty=True)
+    record.uncertainty["undetermined"] = ["ior"]
+    page = report.page([record], {}, [], {}, {})
+    parser = Balance()
+    parser.feed(page)
+    assert parser.open == []
+    for incidence in angles.INCIDENCES:
+        assert f"f in 1/sr over view angle in degrees, light at {incidence:g}" in page
+    assert 'aria-label="relative error over theta_d and theta_h"' in page
+    assert 'aria-label="relative L1 over view angle in degrees"' in page
+    assert re.search(r'class="open">1\.\d+ to 1\.\d+ \?<', page)
+
+
+def test_a_logarithmic_plot_leaves_out_what_has_no_logarithm():
+    svg = plot([Line("one", [0, 1, 2, 3], [0.01, 0.0, 10.0, 100.0], "#000")], "x", "y", log=True)
+    (path,) = re.findall(r'class="curve" d="([^"]*)"', svg)
+    assert path.count("M") == 2 and path.count("L") == 1
+    ticks = re.findall(r'class="end">([^<]*)<', svg)
+    assert ticks == ["0.01", "0.1", "1", "10", "100"]
+
+
+def test_a_heat_map_leaves_out_cells_without_an_error():
+    drawn = heat_map([0, 45, 90], [0, 90], [[0.1], [None]], lambda row, column: f"{row} {column}")
+    assert re.findall(r"<title>([^<]*)</title>", drawn) == ["0 0"]
+    assert color_of(0.1) in drawn and color_of(5.0) == color_of(1.0) != color_of(0.5)
+
+
 WAYS = [
     Picture("diffuse", None, None, 8e-7),
     Picture("principled", None, 0.2, 1.2e-6),
@@ -90,6 +120,36 @@ def test_without_blender_the_page_says_that_no_cost_was_measured(record, tmp_pat
     page = (tmp_path / "index.html").read_text()
     assert page.count("was not measured") == 1 and "sphere error over" not in page
     assert not (tmp_path / "pictures.csv").exists()
+
+
+TRIALS = [
+    Trial("polish", 0.1, 0.2, 0.15, 1, 1000, 12, 9.0),
+    Trial("stages", 0.102, 0.204, 0.5, 1, 1000, 10, 30.0),
+    Trial("ceres", 0.1001, 0.2002, 0.9, 101, 10, 40, 120.0),
+]
+
+
+def test_methods_are_plotted_by_error_and_run_time(record, tmp_path):
+    report.write(tmp_path, [record], trials={record.name: TRIALS})
+    page = (tmp_path / "index.html").read_text()
+    parser = Balance()
+    parser.feed(page)
+    assert parser.open == []
+    assert 'aria-label="L1 over the least, per cent over seconds"' in page
+    assert " min, 606 times as long" in page and "90.9, extrapolated" in page
+    assert "+2.000 %" in page and "+0.100 %" in page
+    assert [line["method"] for line in csv.DictReader((tmp_path / "methods.csv").open())] == [
+        "polish",
+        "stages",
+        "ceres",
+    ]
+
+
+def test_without_trials_the_page_says_so(record, tmp_path):
+    report.write(tmp_path, [record])
+    page = (tmp_path / "index.html").read_text()
+    assert page.count("were not tried") == 1
+    assert not (tmp_path / "methods.csv").exists()
 
 
 def test_every_kind_is_measured(all_models, monkeypatch):

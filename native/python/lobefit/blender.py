@@ -27,6 +27,12 @@ def has_blender() -> bool:
     return all(importlib.util.find_spec(module) for module in _MODULES)
 
 
+def is_this_program() -> bool:
+    """Whether this process is Blender, and not a Python with the module bpy."""
+    bpy = sys.modules.get("bpy")
+    return bpy is not None and bool(bpy.app.binary_path)
+
+
 _POLL = 0.1  # seconds between two looks at work under way
 
 

@@ -8,31 +8,33 @@ import argparse
 import json
 import os
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
-from lobefit import _native, blender, picture, pictures, preview, report, simplified
+from lobefit import _native, blender, methods, picture, pictures, preview, report, simplified
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write
+from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_in
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
     MEASUREMENT_SUFFIXES,
     RECORD_SUFFIX,
     Progress,
-    kept_record,
     record_of,
     spread,
 )
 from lobefit.origin import origin_of, write_samples
-from lobefit.record import MODELS, VISUAL_NORM, Record
+from lobefit.record import MODELS, SCHEDULES, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
 _BAR = 24  # characters
+
+Item = TypeVar("Item")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -59,18 +61,19 @@ def _complain(problem: object) -> int:
     return WRONG
 
 
-def for_each(paths: Iterable[Path], work: Callable[[Path], None]) -> int:
-    """Does `work` for every path, names those that fail on stderr, and returns the exit code."""
-    places, failed = list(paths), 0
-    for path in places:
+def for_each(items: Iterable[Item], work: Callable[[Item], None]) -> int:
+    """Does `work` for every item, tells of those that fail on stderr, and returns the exit code."""
+    count = failed = 0
+    for item in items:
+        count += 1
         try:
-            work(path)
+            work(item)
         except InputError as error:
             failed += 1
             _complain(error)
     if failed == 0:
         return DONE
-    return SOME_FAILED if len(places) > 1 else WRONG
+    return SOME_FAILED if count > 1 else WRONG
 
 
 @contextmanager
@@ -138,8 +141,8 @@ def _add_sample(commands: Any) -> None:
 
 
 def _add_info(commands: Any) -> None:
-    command = _add(commands, _info, "say what measured files hold")
-    command.add_argument("files", metavar="FILE", nargs="+")
+    command = _add(commands, _info, "say what measured files or records hold")
+    command.add_argument("files", metavar="FILE|RECORD.json", nargs="+")
     _add_json(command)
 
 
@@ -168,6 +171,25 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also what a folder already holds, of the same settings",
     )
+    command.add_argument(
+        "--uncertainty",
+        action="store_true",
+        help="also how well the data determine the parameters (up to 3 more times as long)",
+    )
+    where = command.add_mutually_exclusive_group()
+    where.add_argument(
+        "--jobs",
+        type=_within(int, 1, 1024, "a number"),
+        default=1,
+        metavar="N",
+        help="files at once, each in a process with its share of the processors; " + _DEFAULT,
+    )
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a Dask cluster to compute on, as tcp://HOST:8786; its workers have the same build "
+        "of Lobefit and read the files by the same paths",
+    )
     _add_json(command)
 
 
@@ -193,10 +215,11 @@ def _add_closure_options(command: argparse.ArgumentParser) -> None:
 
 
 def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) -> None:
+    command.set_defaults(uncertainty=False)
     group = command.add_argument_group("fit of a measured file")
     group.add_argument("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
     group.add_argument("--no-fresnel", dest="fresnel", action="store_false")
-    group.add_argument("--schedule", choices=("stages", "polish"), default="polish", help=_DEFAULT)
+    group.add_argument("--schedule", choices=SCHEDULES, default="polish", help=_DEFAULT)
     group.add_argument(
         "--norm", choices=("l1", "cosine-l1", "l2", "log-l2"), default=norm, help=_DEFAULT
     )
@@ -215,7 +238,7 @@ def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) ->
         type=_within(int, 0, 1024, "a number"),
         default=0,
         metavar="N",
-        help="0: every processor",
+        help="0: every processor, or a job's share of them; on a cluster one",
     )
 
 
@@ -284,6 +307,7 @@ def _add_report(commands: Any) -> None:
     command = _add(commands, _report, "write a page of pictures, errors and run times")
     command.add_argument("files", metavar="FILE|RECORD.json|DIR", nargs="+")
     _add_fit_options(command, model="all", norm=VISUAL_NORM)
+    command.set_defaults(uncertainty=True)
     command.add_argument("-o", dest="output", required=True, metavar="DIR")
 
 
@@ -317,6 +341,9 @@ def _sample(options: argparse.Namespace) -> int:
 
 def _info(options: argparse.Namespace) -> int:
     def tell(path: Path) -> None:
+        if path.suffix.lower() == RECORD_SUFFIX:
+            _tell_of_record(Record.load(path), path, options.json)
+            return
         measurement = read(path)
         bins, origin = dict(measurement.bins), origin_of(path)
         warnings = _bin_warnings(bins)
@@ -333,6 +360,49 @@ def _info(options: argparse.Namespace) -> int:
             print(f"  warning: {warning}")
 
     return for_each(map(Path, options.files), tell)
+
+
+def _tell_of_record(record: Record, path: Path, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(json.loads(record.to_json())))
+        return
+    print(f"{path}: {record.name}, norm {record.norm}, schedule {record.schedule}")
+    for model, fit in record.fits.items():
+        print(f" {preview.TITLES[model]}{'' if fit.converged else ', not converged'}")
+        for line in _fit_lines(fit):
+            print(f"   {line}")
+    for entry in record.closures:
+        print(f" closures: {entry['target']}, {entry['count']}, sphere error {entry['error']:.4f}")
+
+
+def _fit_lines(fit: Fit) -> Iterator[str]:
+    """What a fit found out, a line each."""
+    for name in ("diffuse", "specular", "exponent", "interpolation", "ior"):
+        if fit.parameters[name] is None:
+            continue
+        yield f"{name:14} {_numbers(fit.parameters[name])}"
+        for variable, (low, high) in fit.intervals.items():
+            if variable.split()[0] == name:
+                mark = "  undetermined" if variable in fit.uncertainty["undetermined"] else ""
+                yield f"  {variable:14} {low:.4g} to {high:.4g}{mark}"
+    for name, figure in fit.error.items():
+        yield f"{name:20} {_numbers(figure['pooled'])}  (rgb {_numbers(figure['rgb'])})"
+    if fit.error_by_angle:
+        view = fit.error_by_angle["view"]
+        steps = zip(pairwise(view["view_angle"]), view["misfit"], view["measured"], strict=True)
+        for (low, high), misfit, measured in list(steps)[::3]:
+            error = misfit / measured if measured > 0 else None
+            yield f"view at {low:2g} to {high:2g} deg  relative error {_numbers(error)}"
+    for angle, measured, model in zip(*fit.albedo.values(), strict=True):
+        yield f"albedo at {angle:2g} deg  measured {_numbers(measured)}, model {_numbers(model)}"
+    for warning in fit.warnings:
+        yield f"warning: {warning}"
+
+
+def _numbers(values: Any) -> str:
+    if isinstance(values, list):
+        return " ".join(map(_numbers, values))
+    return "unknown" if values is None else f"{values:.4g}"
 
 
 def _bin_warnings(bins: dict[str, int]) -> list[str]:
@@ -363,61 +433,37 @@ def _write_records(
     tell: Callable[[Record, Path], None],
 ) -> int:
     """Writes the record of every file of a command line, and tells of it."""
-    output = Path(options.output)
+    output, fitted = Path(options.output), _fit_options(options)
     one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
     paths = spread(options.files, suffixes)
-    if not one:
-        make_folder(output)
+    way = on_cluster(options.scheduler) if options.scheduler else in_processes(options.jobs)
+    if one:
+        tasks = [Task(paths[0], output, closures, fitted)]
+    else:
+        tasks = tasks_in(make_folder(output), paths, closures, fitted)
 
-    batch = Batch(len(paths))
-
-    def write_one(path: Path) -> None:
-        place = output if one else output / f"{path.stem}{RECORD_SUFFIX}"
-        place_to_write(place)
-        fitted = _fit_options(options)
-        # A folder that was interrupted goes on where it stopped.
-        keeps = not one and not options.again
-        record = kept_record(place, path, closures, **fitted) if keeps else None
-        name = batch.next(path, kept=record is not None)
-        if record is None:
-            with progress_bar(name) as progress:
-                record = record_of(path, progress, closures=closures, **fitted)
-            record.save(place)
+    def show(ended: Ended) -> None:
+        task, record = ended
+        if isinstance(record, InputError):
+            raise record
         if options.json:
-            print(json.dumps({"record": str(place)} | json.loads(record.to_json())))
+            print(json.dumps({"record": str(task.place)} | json.loads(record.to_json())))
         else:
-            tell(record, place)
+            tell(record, task.place)
 
-    code = for_each(paths, write_one)
+    # A folder that was interrupted goes on where it stopped.
+    batch = Batch(tasks, way, keep=not one and not options.again, bar=progress_bar)
+    with closing(batch.run()) as ended:
+        code = for_each(ended, show)
     if batch.kept:
-        kept = f"{batch.kept} of {batch.count} kept from before (--again computes them anew)"
+        kept = f"{batch.kept} of {len(tasks)} kept from before (--again computes them anew)"
         print(f"lobefit: {kept}", file=sys.stderr)
     return code
 
 
-class Batch:
-    """How far a command is through its files."""
-
-    def __init__(self, count: int) -> None:
-        self.count, self.kept = count, 0
-        self._begun, self._start = 0, time.monotonic()
-
-    def next(self, path: Path, kept: bool) -> str:
-        """What stands before the bar of the next file: its number, and the time left for all."""
-        computed = self._begun - self.kept
-        self._begun += 1
-        self.kept += kept
-        if self.count == 1:
-            return path.name
-        # What is kept takes no time.
-        each = (time.monotonic() - self._start) / max(computed, 1)
-        left = f", {each * (self.count - self._begun + 1):.0f} s left" if computed else ""
-        return f"{self._begun}/{self.count}{left}: {path.name}"
-
-
 def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
     names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
-    return {name: getattr(options, name) for name in names}
+    return {name: getattr(options, name) for name in (*names, "uncertainty")}
 
 
 def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures] = ()) -> Record:
@@ -446,6 +492,8 @@ def _print_fit(record: Record, place: Path) -> None:
         figure = preview.FIGURES[record.leading_figure]
         mark = "*" if record.models and model == record.model else " "
         print(f" {mark} {model:20} {figure} {error:.4f}, {fit.seconds['total']:.2f} s")
+        if fit.uncertainty and fit.uncertainty["undetermined"]:
+            print(f"   undetermined: {', '.join(fit.uncertainty['undetermined'])}")
     for warning in record.warnings:
         print(f"   warning: {warning}")
 
@@ -517,9 +565,18 @@ def _report(options: argparse.Namespace) -> int:
         if blender.has_blender():
             records = [_with_closures(record) for record in records]
             ways = {record.name: pictures.measure(record) for record in records}
-        report.write(options.output, records, ways=ways)
+        trials = {record.name: _trials(record, options.threads) for record in records}
+        report.write(options.output, records, ways=ways, trials=trials)
         print(Path(options.output) / "index.html")
     return code
+
+
+def _trials(record: Record, threads: int) -> list[methods.Trial]:
+    measurement = preview.measurement_of(record)
+    if measurement is None:
+        return []
+    with progress_bar(record.name) as progress:
+        return methods.compare(measurement, progress, threads)
 
 
 def _with_closures(record: Record) -> Record:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from lobefit import blender, picture, pictures, preview, report
+from lobefit import blender, methods, picture, pictures, preview, report
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder
 from lobefit.command_line import DONE, INTERRUPTED, SOME_FAILED, WRONG, progress_bar
@@ -35,21 +35,25 @@ class _Demo:
     rows: list[preview.Row] = field(default_factory=list)
     renderings: dict[str, report.Rendering] = field(default_factory=dict)
     ways: dict[str, list[pictures.Picture]] = field(default_factory=dict)
+    trials: dict[str, list[methods.Trial]] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
 
     def add(self, path: Path) -> None:
         """One material, from its file to its picture."""
         with progress_bar(path.name) as progress:
-            record = record_of(path, progress, model="all", norm=VISUAL_NORM, closures=[Closures()])
+            fitted = {"model": "all", "norm": VISUAL_NORM, "uncertainty": True}
+            record = record_of(path, progress, closures=[Closures()], **fitted)
             if self.has_blender:
                 record = pictures.with_closures(record, progress)
+            measurement = read(path)
+            self.trials[record.name] = methods.compare(measurement, progress)
         record.save(make_folder(self.folder / "records") / f"{path.stem}.json")
         self.records.append(record)
         if self.has_blender:
             self.attempt(path.name, partial(self.build, record, path.stem))
         rendering = self.renderings.get(record.name)
         pixels = rendering.pixels if rendering else None
-        self.rows.append(preview.row(record, read(path), rendered=pixels))
+        self.rows.append(preview.row(record, measurement, rendered=pixels))
 
     def build(self, record: Record, name: str) -> None:
         """The Blender file of a record, the picture that Cycles makes of it, and what it costs."""
@@ -64,7 +68,9 @@ class _Demo:
     def finish(self) -> None:
         """What is made of all materials together."""
         picture.write_png(self.folder / "materials.png", preview.sheet(self.rows))
-        report.write(self.folder, self.records, self.renderings, self.failures, self.ways)
+        report.write(
+            self.folder, self.records, self.renderings, self.failures, self.ways, self.trials
+        )
         built = [record for record in self.records if record.name in self.renderings]
         if built:
             blender.write_library(self.folder / "materials.blend", built, KIND)

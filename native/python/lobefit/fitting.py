@@ -81,11 +81,14 @@ class Job:
 
     `source` is a file, a measurement, or a record, whose fit is then kept. `model` is one of
     `record.MODELS`, or "all" for one after the other. `closures` are approximations to find after
-    the fit. `fresnel` False fits the models without the Fresnel term. `schedule` is "stages" (the
-    three of Nielsen et al.) or "polish" (a joint fit after them). `norm` is "l1" (the paper's),
+    the fit. `fresnel` False fits the models without the Fresnel term. `schedule` is "polish" (all
+    parameters jointly, from many starts on a subsample, and the best on all bins), "subsample" (the
+    same without its end on all bins), "joint" (on all bins from the best start) or "stages" (there,
+    the three of Nielsen et al.). `norm` is "l1" (the paper's),
     "cosine-l1", "l2" or "log-l2". `max_angle` in degrees (up to 90) leaves out light and view
-    directions beyond it. `channels` is "shared" (one exponent) or "separate". `threads` 0 takes
-    every processor.
+    directions beyond it. `channels` is "shared" (one exponent) or "separate". `uncertainty` True
+    also finds how well the data determine the parameters, which takes up to three times as long as
+    the fit itself (metals). `threads` 0 takes every processor.
     """
 
     def __init__(
@@ -205,6 +208,7 @@ class Job:
     def _end_current(self) -> None:
         result = without_nan(self._running.result())
         if isinstance(self._running, _native.FitJob):
+            result["error_by_angle"] = _rounded(result["error_by_angle"])
             self._fitted.append(result)
             self._measurement = self._running.measurement
             return
@@ -274,6 +278,13 @@ def _wait_for(job: Job, progress: Callable[[float, str], None] | None) -> Record
     except BaseException:
         job.cancel()
         raise
+
+
+def _rounded(value: Any) -> Any:
+    """Five digits of every number, which keeps the hundreds of a map from filling the record."""
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    return [_rounded(item) for item in value] if isinstance(value, list) else float(f"{value:.5g}")
 
 
 def _record(results: list[dict[str, Any]], origin: Origin) -> Record:

@@ -75,6 +75,7 @@ def kept_record(
             == (list(MODELS) if options["model"] == "all" else [options["model"]])
             and (record.parameters["ior"] is not None) == options["fresnel"]
             and all(getattr(record, name) == options[name] for name in _KEPT_OPTIONS)
+            and (record.uncertainty is not None or not options.get("uncertainty"))
             and all(request.is_in(record) for request in closures)
         )
         return record if same and origin_of(path).sha256 == record.source["sha256"] else None

@@ -1,4 +1,4 @@
-"""Line plots as inline SVG, as much of a plotting library as the report needs."""
+"""Plots as inline SVG, as much of a plotting library as the report needs."""
 
 import math
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ from html import escape
 
 _WIDTH, _HEIGHT = 460, 250
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 14, 14, 44
+_DECADES = 6  # of a logarithmic axis
 
 
 @dataclass(frozen=True)
@@ -22,24 +23,64 @@ class Line:
     marks: Sequence[str] = ()  # a word or number beside each point
 
 
-def plot(lines: Sequence[Line], x_title: str, y_title: str) -> str:
-    """The lines over common linear axes from 0, as an SVG element."""
-    known = [(x, y) for line in lines for x, y in zip(line.x, line.y, strict=True) if y is not None]
+@dataclass(frozen=True)
+class _Scale:
+    """Where a value stands on an axis, from 0 at its first tick to 1 at its end."""
+
+    ticks: Sequence[float]
+    end: float
+    log: bool = False
+
+    def share(self, value: float) -> float:
+        low, high, at = self.ticks[0], self.end, value
+        if self.log:
+            low, high, at = (math.log10(number) for number in (low, high, at))
+        return (at - low) / ((high - low) or 1.0)
+
+    def holds(self, value: float) -> bool:
+        return not self.log or value >= self.ticks[0]
+
+
+def plot(
+    lines: Sequence[Line],
+    x_title: str,
+    y_title: str,
+    *,
+    x_ticks: Sequence[float] = (),
+    log: bool = False,
+) -> str:
+    """The lines over common axes, as an SVG element.
+
+    The x axis begins and ends with `x_ticks`, and goes from 0 to the last x without them. The y
+    axis is linear from 0, or logarithmic over at most `_DECADES`, below which lines are parted.
+    """
+    known = [
+        (x, y)
+        for line in lines
+        for x, y in zip(line.x, line.y, strict=True)
+        if y is not None and (y > 0 or not log)
+    ]
     if not known:
         return ""
-    last = max(x for x, _ in known)
-    x_ticks = [tick for tick in _ticks(last) if tick <= last]
-    axes = _Axes(last, x_ticks, _ticks(max(y for _, y in known)))
-    parts = [
-        f'<svg class="plot" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" '
-        f'aria-label="{escape(y_title)} over {escape(x_title)}">',
-        axes.grid(),
-        f'<text x="{(_LEFT + _WIDTH - _RIGHT) / 2}" y="{_HEIGHT - 6}" class="middle">'
-        f"{escape(x_title)}</text>",
-        f'<text transform="translate(13 {(_TOP + _HEIGHT - _BOTTOM) / 2}) rotate(-90)" '
-        f'class="middle">{escape(y_title)}</text>',
-    ]
-    return "".join(parts + [axes.curve(line) for line in lines]) + "</svg>"
+    last = x_ticks[-1] if x_ticks else max(x for x, _ in known)
+    x_scale = _Scale(x_ticks or [tick for tick in _ticks(last) if tick <= last], last)
+    heights = [y for _, y in known]
+    y_ticks = _decades(min(heights), max(heights)) if log else _ticks(max(heights))
+    axes = _Axes(x_scale, _Scale(y_ticks, y_ticks[-1], log))
+    drawn = axes.grid() + "".join(axes.curve(line) for line in lines)
+    return framed(drawn, x_title, y_title, _WIDTH, _HEIGHT)
+
+
+def framed(drawn: str, x_title: str, y_title: str, width: int, height: int) -> str:
+    """What is drawn between the axes as an SVG element with the titles of the axes."""
+    return (
+        f'<svg class="plot" viewBox="0 0 {width} {height}" role="img" '
+        f'aria-label="{escape(y_title)} over {escape(x_title)}">{drawn}'
+        f'<text x="{(_LEFT + width - _RIGHT) / 2}" y="{height - 6}" class="middle">'
+        f"{escape(x_title)}</text>"
+        f'<text transform="translate(13 {(_TOP + height - _BOTTOM) / 2}) rotate(-90)" '
+        f'class="middle">{escape(y_title)}</text></svg>'
+    )
 
 
 def legend(lines: Sequence[Line]) -> str:
@@ -53,31 +94,30 @@ def legend(lines: Sequence[Line]) -> str:
 
 
 class _Axes:
-    def __init__(self, last: float, x_ticks: list[float], y_ticks: list[float]) -> None:
-        self._last, self._x, self._y = last, x_ticks, y_ticks
+    def __init__(self, x: _Scale, y: _Scale) -> None:
+        self._x, self._y = x, y
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
-        across, up = x / (self._last or 1.0), y / self._y[-1]
         return (
-            _LEFT + across * (_WIDTH - _LEFT - _RIGHT),
-            _HEIGHT - _BOTTOM - up * (_HEIGHT - _TOP - _BOTTOM),
+            _LEFT + self._x.share(x) * (_WIDTH - _LEFT - _RIGHT),
+            _HEIGHT - _BOTTOM - self._y.share(y) * (_HEIGHT - _TOP - _BOTTOM),
         )
 
     def grid(self) -> str:
         parts = []
-        for tick in self._y:
-            x, y = self._place(self._x[0], tick)
+        for tick in self._y.ticks:
+            x, y = self._place(self._x.ticks[0], tick)
             parts.append(f'<path class="grid" d="M{x:.1f} {y:.1f}H{_WIDTH - _RIGHT}"/>')
             parts.append(f'<text x="{x - 6:.1f}" y="{y + 4:.1f}" class="end">{tick:g}</text>')
-        for tick in self._x:
-            x, y = self._place(tick, self._y[0])
+        for tick in self._x.ticks:
+            x, y = self._place(tick, self._y.ticks[0])
             parts.append(f'<text x="{x:.1f}" y="{y + 16:.1f}" class="middle">{tick:g}</text>')
         return "".join(parts)
 
     def curve(self, line: Line) -> str:
         path, pen_down, dots, marks = [], False, [], []
         for index, (x, y) in enumerate(zip(line.x, line.y, strict=True)):
-            if y is None:
+            if y is None or not self._y.holds(y):
                 pen_down = False
                 continue
             at = self._place(x, y)
@@ -101,6 +141,14 @@ class _Axes:
 
 def _dashes(line: Line) -> str:
     return ' stroke-dasharray="5 4"' if line.dashed else ""
+
+
+def _decades(low: float, high: float) -> list[float]:
+    """Powers of ten that hold both numbers, or the upper ones of these."""
+    top = math.ceil(math.log10(high))
+    return [
+        10.0**power for power in range(max(math.floor(math.log10(low)), top - _DECADES), top)
+    ] + [10.0**top]
 
 
 def _ticks(high: float) -> list[float]:

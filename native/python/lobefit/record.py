@@ -18,7 +18,11 @@ from lobefit.atomic import reason, write_bytes
 
 SCHEMA = 1
 MODELS = ("modified-phong", "modified-blinn-phong", "interpolated")
+# How a fit goes about it; see `Job`.
+SCHEDULES = ("stages", "polish", "joint", "subsample")
 ERRORS = ("l1", "relative_l1", "relative_l1_80", "relative_l1_cosine")
+
+_CHANNELS = ("red", "green", "blue", "")
 
 # The norm of fits that are made to be looked at: plain L1 is the paper's, but bins near grazing,
 # of which a picture shows little, rule it.
@@ -38,6 +42,19 @@ class Fit:
     Nielsen et al.), `exponent` (one number, or three with separate channels), `interpolation`
     (None but for eq. 3) and `ior` (None without Fresnel). `error` has the figures of `ERRORS`, each
     with `pooled` and `rgb`. `stages` are {name, l1, seconds, iterations} in the order they ran.
+
+    `error_by_angle` tells where the error stands, by sums of |f - m| (`misfit`) and of m
+    (`measured`) of the parts of the hemisphere, both relative to all that was measured. So the
+    misfits add up to the relative error of the whole, and misfit / measured is that of a part.
+    `half_difference` {theta_h, theta_d, misfit, measured} has a row for each step of theta_h, of
+    bins as they are (`relative_l1`); `view` {view_angle, misfit, measured} goes by the viewer's
+    angle from the normal, of bins weighted as in `relative_l1_cosine`. Angles are in degrees and
+    one more than the steps, which they stand between.
+
+    `uncertainty` is None where it was not asked for. `low` and `high` are parameters: the ends of
+    intervals of `confidence` around the fit, from a jackknife over `blocks` parts of the data.
+    `undetermined` names those of `variables` whose interval is wider than a factor of 2 (the
+    interpolation: than half of its range), `correlation` is a matrix of all variables.
     """
 
     model: str
@@ -50,6 +67,19 @@ class Fit:
     albedo: dict[str, list[Any]]
     warnings: list[str]
     principled: dict[str, Any]
+    error_by_angle: dict[str, dict[str, Any]] | None = None
+    uncertainty: dict[str, Any] | None = None
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """The ends of the interval of each variable ("diffuse red", .., "ior"), if known."""
+        if self.uncertainty is None:
+            return {}
+        low, high = self.uncertainty["low"], self.uncertainty["high"]
+        return {
+            variable: (_of_variable(low, variable), _of_variable(high, variable))
+            for variable in self.uncertainty["variables"]
+        }
 
 
 @dataclass(kw_only=True)
@@ -102,7 +132,9 @@ class Record(Fit):
         words = ["lobefit", "fit", str(path), "--model", "all" if self.models else self.model]
         words += ["--no-fresnel"] if self.parameters["ior"] is None else []
         words += ["--schedule", self.schedule, "--norm", self.norm, "--channels", self.channels]
-        words += ["--max-angle", f"{self.max_angle:g}", "-o", f"{path.stem}.json"]
+        words += ["--max-angle", f"{self.max_angle:g}"]
+        words += ["--uncertainty"] if self.uncertainty else []
+        words += ["-o", f"{path.stem}.json"]
         return shlex.join(words)
 
     def to_json(self) -> str:
@@ -127,7 +159,7 @@ class Record(Fit):
             raise InputError(f"{name}: {mismatch}.") from None
         known = {key: data[key] for key in _names(cls) if key in data}
         known["models"] = {
-            model: Fit(**{key: fit[key] for key in _names(Fit)})
+            model: Fit(**{key: fit[key] for key in _names(Fit) if key in fit})
             for model, fit in data.get("models", {}).items()
         }
         return cls(**known)
@@ -173,6 +205,12 @@ def _processor() -> str:
 
 def _names(kind: type) -> list[str]:
     return [item.name for item in dataclasses.fields(kind)]
+
+
+def _of_variable(parameters: dict[str, Any], variable: str) -> float:
+    name, _, channel = variable.partition(" ")
+    value = parameters[name]
+    return value[_CHANNELS.index(channel)] if isinstance(value, list) else value
 
 
 def without_nan(value: Any) -> Any:
@@ -281,7 +319,7 @@ def _exponent(value: Any, where: str) -> None:
 
 
 def _fit(extra: dict[str, _Check], optional: dict[str, _Check] | None = None) -> _Check:
-    shape = _object(_FIT | extra, optional)
+    shape = _object(_FIT | extra, _FIT_EXTRAS | (optional or {}))
 
     def check(value: Any, where: str) -> None:
         shape(value, where)
@@ -300,6 +338,41 @@ def _models(value: Any, where: str) -> None:
     for model, fit in value.items():
         _choice(*MODELS)(model, f"the key in {where}")
         _fit({"model": _choice(model)})(fit, f"{where}.{model}")
+
+
+def _angles(value: Any, where: str) -> None:
+    _list(_AMOUNT)(value, where)
+    if len(value) < 2 or any(a >= b for a, b in itertools.pairwise(value)):
+        raise _Mismatch(where, "rising angles, at least two", value)
+
+
+def _parts(*angles: str) -> _Check:
+    """Sums over the steps of these angles; of two angles a list for each step of the first."""
+
+    def check(value: Any, where: str) -> None:
+        _object({angle: _angles for angle in angles})(value, where)
+        sums = _AMOUNT
+        for angle in reversed(angles):
+            sums = _list(sums, len(value[angle]) - 1)
+        _object({"misfit": sums, "measured": sums})(value, where)
+
+    return check
+
+
+def _uncertainty(value: Any, where: str) -> None:
+    _object({"variables": _list(_TEXT)})(value, where)
+    names = value["variables"]
+    _object(
+        {
+            "confidence": _INTERPOLATION,
+            "blocks": _COUNT,
+            "seconds": _AMOUNT,
+            "low": _PARAMETERS,
+            "high": _PARAMETERS,
+            "undetermined": _list(_choice(*names)),
+            "correlation": _list(_list(_NUMBER, len(names)), len(names)),
+        }
+    )(value, where)
 
 
 _TEXT = _kind("text", lambda value: isinstance(value, str))
@@ -348,6 +421,13 @@ _FIT: dict[str, _Check] = {
     "warnings": _list(_TEXT),
     "principled": _PRINCIPLED,
 }
+# What records of the first builds do not have.
+_FIT_EXTRAS: dict[str, _Check] = {
+    "error_by_angle": _or_null(
+        _object({"half_difference": _parts("theta_h", "theta_d"), "view": _parts("view_angle")})
+    ),
+    "uncertainty": _or_null(_uncertainty),
+}
 _CLOSURES = _object(
     {
         "target": _choice("measured", "lobe"),
@@ -384,7 +464,7 @@ _RECORD = _fit(
             {"path": _or_null(_TEXT), "sha256": _or_null(_TEXT), "format": _TEXT, "bins": _BINS},
             {"name": _TEXT},
         ),
-        "schedule": _choice("stages", "polish"),
+        "schedule": _choice(*SCHEDULES),
         "norm": _choice("l1", "cosine-l1", "l2", "log-l2"),
         "channels": _choice("shared", "separate"),
         "max_angle": _number(0, 90, "a number from 0 to 90"),

@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lobefit import picture, pictures, preview
+from lobefit import angles, methods, picture, pictures, preview
 from lobefit.atomic import make_folder, write_bytes
+from lobefit.methods import Trial
 from lobefit.pictures import Picture
 from lobefit.plot import Line, legend, plot
 from lobefit.record import ERRORS, Fit, Record
+from lobefit.scatter import Point, scatter
 
 _COLORS = {
     "modified-phong": "#c2571a",
@@ -31,6 +33,15 @@ _KINDS = {
     "principled": "#c2571a",
     "diffuse": "#8b8f96",
 }
+_METHODS = {
+    "polish": "#2c8a4b",
+    "subsample": "#77b255",
+    "joint": "#3f9c8c",
+    "stages": "#8a4bb0",
+    "ceres": "#2a6fb0",
+    "scipy": "#c2571a",
+}
+_LEAST_EXCESS = 0.01  # per cent of L1; methods that are closer to each other are equally good
 _CHANNELS = (("red", "#c8402f"), ("green", "#3b8f3e"), ("blue", "#3166c4"))
 _ERROR_TITLES = {
     "l1": "mean |f &minus; m|",
@@ -60,9 +71,11 @@ th { text-align: left; font-weight: 600 } td, th { padding: .22rem .9rem .22rem 
 tr.own td { font-weight: 600 } code { font-size: .85rem; overflow-wrap: anywhere }
 .plot { width: 100%; height: auto } .plot text { fill: var(--faint); font-size: 11px }
 .plot .middle { text-anchor: middle } .plot .end { text-anchor: end }
+.plot .name { fill: var(--ink); font-weight: 600 }
 .grid { stroke: var(--line) } .curve { fill: none; stroke-width: 2 }
 .legend span { margin-right: 1.1rem; font-size: .85rem; white-space: nowrap;
   display: inline-block } .legend svg { margin-right: .4rem }
+.maps > div { flex: 0 1 358px } .open { color: #b8741a }
 .warning { border-left: 3px solid #d9902f; padding-left: .7rem }
 """
 
@@ -81,16 +94,20 @@ def write(
     renderings: Mapping[str, Rendering] | None = None,
     failures: Iterable[str] = (),
     ways: Mapping[str, Sequence[Picture]] | None = None,
+    trials: Mapping[str, Sequence[Trial]] | None = None,
 ) -> None:
-    """Writes index.html, report.csv and, where there are `ways` to show a record, pictures.csv.
+    """Writes index.html, report.csv and, of records with `ways` or `trials`, a table of these.
 
-    `renderings` and `ways` (see `pictures.measure`) are found by a record's name.
+    `renderings`, `ways` to show (see `pictures.measure`) and `trials` of methods (see
+    `methods.compare`) are found by a record's name; the tables are pictures.csv and methods.csv.
     """
     place = make_folder(folder)
     write_bytes(place / "report.csv", table(records).encode())
     if ways:
         write_bytes(place / "pictures.csv", pictures.table(ways).encode())
-    text = page(records, renderings or {}, failures, ways or {})
+    if trials:
+        write_bytes(place / "methods.csv", methods.table(trials).encode())
+    text = page(records, renderings or {}, failures, ways or {}, trials or {})
     write_bytes(place / "index.html", text.encode())
 
 
@@ -117,6 +134,7 @@ def page(
     renderings: Mapping[str, Rendering],
     failures: Iterable[str],
     ways: Mapping[str, Sequence[Picture]],
+    trials: Mapping[str, Sequence[Trial]],
 ) -> str:
     """The whole page; it refers to nothing outside of itself."""
     body = [
@@ -127,7 +145,13 @@ def page(
         *(f'<p class="warning">{escape(failure)}</p>' for failure in failures),
         _overview(records),
         *(
-            _section(index, record, renderings.get(record.name), ways.get(record.name, ()))
+            _section(
+                index,
+                record,
+                renderings.get(record.name),
+                ways.get(record.name, ()),
+                trials.get(record.name, ()),
+            )
             for index, record in enumerate(records)
         ),
     ]
@@ -154,7 +178,11 @@ def _overview(records: list[Record]) -> str:
 
 
 def _section(
-    index: int, record: Record, rendering: Rendering | None, ways: Sequence[Picture]
+    index: int,
+    record: Record,
+    rendering: Rendering | None,
+    ways: Sequence[Picture],
+    trials: Sequence[Trial],
 ) -> str:
     return "".join(
         [
@@ -166,11 +194,15 @@ def _section(
             _parameters(record),
             "<h3>Errors</h3>",
             _errors(record),
-            '<div class="side"><div><h3>Error against run time</h3>',
+            "<h3>Error against run time of the fit</h3>",
+            _trials(trials),
+            '<div class="side"><div><h3>Error after each stage</h3>',
             _run_time_plot(record),
             "</div><div><h3>Albedo by view angle</h3>",
             _albedo_plot(record),
-            "</div></div><h3>Error of pictures against their cost</h3>",
+            "</div></div>",
+            angles.section(record, _COLORS),
+            "<h3>Error of pictures against their cost</h3>",
             _pictures(ways),
             "<h3>Seconds by stage</h3>",
             _stages(record),
@@ -206,7 +238,33 @@ def _parameters(record: Record) -> str:
         rest = (fit.parameters[name] for name in ("interpolation", "ior"))
         yes = "yes" if fit.converged else "no"
         rows.append([preview.TITLES[model], *map(_numbers, values), *map(_number, rest), yes])
-    return _table(head, rows, _own(record))
+    table = _table(head, rows, _own(record))
+    return table + _intervals(record) if record.uncertainty else table
+
+
+def _intervals(record: Record) -> str:
+    """A table with a row for every variable and a column for every fit."""
+    names = list(dict.fromkeys(name for fit in record.fits.values() for name in fit.intervals))
+    head = ["variable", *(preview.TITLES[model] for model in record.fits)]
+    rows = [[name, *(_interval(fit, name) for fit in record.fits.values())] for name in names]
+    confidence = record.uncertainty["confidence"]
+    return (
+        f"<h3>Intervals of {confidence:.0%} of the parameters</h3>"
+        f"{_table(head, rows)}"
+        '<p class="faint">From fits without each of '
+        f"{record.uncertainty['blocks']} parts of the data. What is "
+        '<span class="open">marked ?</span> is undetermined: within no factor of 2, an '
+        "interpolation within no half of its range.</p>"
+    )
+
+
+def _interval(fit: Fit, variable: str) -> str:
+    if variable not in fit.intervals:
+        return ""
+    text = " to ".join(f"{float(f'{end:.3g}'):g}" for end in fit.intervals[variable])
+    if variable in fit.uncertainty["undetermined"]:
+        return f'<span class="open">{text} ?</span>'
+    return text
 
 
 def _errors(record: Record) -> str:
@@ -224,6 +282,8 @@ def _stages(record: Record) -> str:
         for stage in fit.stages:
             cells = [f"{stage['seconds']:.3f}", str(stage["iterations"]), _number(stage["l1"])]
             rows.append(["", escape(stage["name"]), *cells])
+        if fit.uncertainty:
+            rows.append(["", "uncertainty", f"{fit.uncertainty['seconds']:.3f}", "", ""])
         rows.append(["", "total", f"{fit.seconds['total']:.3f}", "", ""])
     return _table(["model", "stage", "seconds", "iterations", "error after it"], rows)
 
@@ -241,6 +301,60 @@ def _run_time(model: str, fit: Fit) -> Line:
     ]
     errors = [stage["l1"] for stage in fit.stages]
     return Line(preview.TITLES[model], ends[1:], errors, _COLORS[model], dots=dots)
+
+
+def _trials(trials: Sequence[Trial]) -> str:
+    if not trials:
+        return '<p class="faint">Other ways to the fit were not tried.</p>'
+    least = min(trial.l1 for trial in trials)
+    own = next(trial.seconds for trial in trials if trial.method == "polish")
+    excess = {trial.method: 100 * (trial.l1 / least - 1) if least else 0.0 for trial in trials}
+    points = [
+        Point(
+            methods.TITLES[trial.method],
+            _duration(trial.seconds_of_all)
+            + (f", {trial.seconds_of_all / own:.0f} times as long" if trial.extrapolated else ""),
+            trial.seconds_of_all,
+            excess[trial.method],
+            _METHODS[trial.method],
+            large=trial.method == "polish",
+            estimated_from=trial.seconds if trial.extrapolated else None,
+        )
+        for trial in trials
+    ]
+    head = ["method", "L1 over the least", "relative L1", "seconds", "of Lobefit"]
+    rows = [
+        [
+            methods.TITLES[trial.method],
+            f"+{excess[trial.method]:.3f} %",
+            _number(trial.relative_l1),
+            _short(trial.seconds_of_all) + (", extrapolated" if trial.extrapolated else ""),
+            _short(trial.seconds_of_all / own),
+            f"{trial.bins:,}",
+            str(trial.iterations),
+            f"{trial.passes:.3g}",
+        ]
+        for trial in trials
+    ]
+    shown = scatter(points, "seconds", "L1 over the least, per cent", _LEAST_EXCESS)
+    note = (
+        '<p class="faint">Nine parameters of the interpolated model with Fresnel, fitted by plain '
+        "L1 in this run, reading not counted; the error is that of all bins. A ring stands for all "
+        "bins; its time was reckoned from the dot it hangs on, a fit to one bin in "
+        f"{methods.THINNED}. Ceres and scipy begin at the best start of Lobefit's scan, which "
+        "costs them nothing.</p>"
+    )
+    counts = ["bins at the end", "iterations", "passes over the bins"]
+    return f"{shown}{note}{_table([*head, *counts], rows)}"
+
+
+def _duration(seconds: float) -> str:
+    return f"{_short(seconds)} s" if seconds < 60 else f"{_short(seconds / 60)} min"
+
+
+def _short(value: float) -> str:
+    """Two digits after the point, or none where three stand before it."""
+    return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
 
 
 def _pictures(ways: Sequence[Picture]) -> str:
