@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 
 #include "fitting/minimise.h"
-#include "fitting/samples.h"
 #include "fitting/variables.h"
+#include "measurement/input_error.h"
 #include "measurement/parallel.h"
 
 namespace lobefit {
@@ -86,14 +87,23 @@ ceres::Solver::Options solver_options(int threads) {
 
 }  // namespace
 
-NaiveFit fit_naively(const Measurement& measurement, const Parameters& start, int every,
-                     int threads, const Monitor& monitor) {
+Samples samples_for_others(const Measurement& measurement, int bins, int threads) {
+  if (bins < 0) throw InputError("bins: expected 0 (all of them) or more, found less.");
+  Samples all = all_samples(measurement, {.threads = threads});
+  if (bins == 0 || bins >= measurement.bins().valid) return all;
+  constexpr int bins_of_a_sample = 2;
+  return subsample(all, static_cast<std::size_t>(std::max(1, bins / bins_of_a_sample)),
+                   thread_count(threads));
+}
+
+NaiveFit fit_naively(const Samples& samples, const Parameters& start, int threads,
+                     const Monitor& monitor) {
   const auto began = std::chrono::steady_clock::now();
   const Variables variables(ModelKind::interpolated, true, false);
-  const double unit = typical_reflectance(measurement);
-  Eigen::VectorXd x = variables.from_parameters(start, unit);
+  Eigen::VectorXd x = variables.from_parameters(start, samples.unit);
 
   ceres::SoftLOneLoss loss(fine_precision().smoothing.back());
+  std::deque<ceres::ScaledLoss> scaled;
   ceres::Problem problem(problem_options());
   problem.AddParameterBlock(x.data(), variable_count);
   for (int i = 0; i < variable_count; ++i) {
@@ -101,18 +111,21 @@ NaiveFit fit_naively(const Measurement& measurement, const Parameters& start, in
     problem.SetParameterUpperBound(x.data(), i, variables.upper()[i]);
   }
   NaiveFit fit;
-  int valid = 0;
-  for (int h = 0; h < Measurement::theta_h_bins; ++h) {
+  for (const Samples::Run& run : samples.runs) {
     monitor.throw_if_cancelled();
-    for (int d = 0; d < Measurement::theta_d_bins; ++d) {
-      for (int p = 0; p < Measurement::phi_d_bins; ++p) {
-        if (!measurement.valid(h, d, p) || valid++ % every != every / 2) continue;
-        const LobeCoordinates at = lobe_coordinates(Measurement::centre(h, d, p));
-        const Rgb measured = measurement.bin(h, d, p) / unit;
-        for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      const double weight = samples.weight[i];
+      if (!(weight > 0)) continue;
+      ceres::LossFunction* weighted = &loss;
+      if (weight != 1) {
+        weighted = &scaled.emplace_back(&loss, weight, ceres::DO_NOT_TAKE_OWNERSHIP);
+      }
+      const LobeCoordinates at{samples.u_phong[i], samples.u_blinn[i], run.cos_theta_d};
+      for (std::size_t half = 0; half < 2; ++half) {
+        for (std::size_t c = 0; c < 3; ++c) {
           auto* const cost = new ceres::AutoDiffCostFunction<Misfit, 1, variable_count>(
-              new Misfit(at, c, measured[c]));
-          problem.AddResidualBlock(cost, &loss, x.data());
+              new Misfit(at, static_cast<int>(c), samples.measured[c][half][i]));
+          problem.AddResidualBlock(cost, weighted, x.data());
         }
         ++fit.bins;
       }
@@ -125,7 +138,7 @@ NaiveFit fit_naively(const Measurement& measurement, const Parameters& start, in
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   monitor.throw_if_cancelled();
-  fit.parameters = variables.to_parameters(x, unit);
+  fit.parameters = variables.to_parameters(x, samples.unit);
   fit.iterations = static_cast<int>(summary.iterations.size());
   fit.passes = summary.num_residual_evaluations + summary.num_jacobian_evaluations;
   fit.converged = summary.termination_type == ceres::CONVERGENCE;

@@ -450,15 +450,41 @@ Result finished(std::function<Result(Monitor&)> work) {
   return job.result();
 }
 
-py::dict l1_terms(const Measurement& measurement) {
+// Rows of the samples: a column for each half, so for each bin, of those that weigh.
+py::dict to_columns(const Samples& samples) {
+  using namespace py::literals;
+  std::vector<double> u_phong, u_blinn, cos_theta_d, weight;
+  std::array<std::vector<double>, 3> measured;
+  for (const Samples::Run& run : samples.runs) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      for (std::size_t half = 0; half < 2 && samples.weight[i] > 0; ++half) {
+        u_phong.push_back(samples.u_phong[i]);
+        u_blinn.push_back(samples.u_blinn[i]);
+        cos_theta_d.push_back(run.cos_theta_d);
+        weight.push_back(samples.weight[i]);
+        for (std::size_t c = 0; c < 3; ++c) measured[c].push_back(samples.measured[c][half][i]);
+      }
+    }
+  }
+  const auto array = [](const std::vector<double>& column) {
+    return py::array_t<double>(static_cast<py::ssize_t>(column.size()), column.data());
+  };
+  return py::dict("u_phong"_a = array(u_phong), "u_blinn"_a = array(u_blinn),
+                  "cos_theta_d"_a = array(cos_theta_d), "weight"_a = array(weight),
+                  "red"_a = array(measured[0]), "green"_a = array(measured[1]),
+                  "blue"_a = array(measured[2]));
+}
+
+py::dict l1_problem(const Measurement& measurement, int bins) {
   using namespace py::literals;
   const Variables variables(ModelKind::interpolated, true, false);
   const auto list = [](const Eigen::VectorXd& x) {
     return std::vector<double>(x.begin(), x.end());
   };
-  return py::dict("unit"_a = typical_reflectance(measurement),
-                  "smoothing"_a = fine_precision().smoothing.back(),
-                  "lower"_a = list(variables.lower()), "upper"_a = list(variables.upper()));
+  const Samples samples = samples_for_others(measurement, bins, 0);
+  return py::dict("unit"_a = samples.unit, "smoothing"_a = fine_precision().smoothing.back(),
+                  "lower"_a = list(variables.lower()), "upper"_a = list(variables.upper()),
+                  "columns"_a = to_columns(samples));
 }
 
 Parameters start_of(const SharedMeasurement& measurement, int threads) {
@@ -481,20 +507,20 @@ py::dict fit_by(const SharedMeasurement& measurement, const std::string& schedul
   const auto bins =
       std::min(static_cast<int>(2 * fit.stages.back().samples), measurement->bins().valid);
   return py::dict("parameters"_a = to_dict(fit.parameters), "error"_a = to_dict(fit.errors),
-                  "bins"_a = bins, "iterations"_a = iterations, "touched"_a = 2 * touched);
+                  "bins"_a = bins, "iterations"_a = iterations, "converged"_a = fit.converged,
+                  "touched"_a = 2 * touched);
 }
 
-py::dict fit_naively_by(const SharedMeasurement& measurement, const py::dict& start, int every,
+py::dict fit_naively_by(const SharedMeasurement& measurement, const py::dict& start, int bins,
                         int threads) {
   using namespace py::literals;
-  if (every < 1) throw InputError("every: expected 1 (all bins) or more, found less.");
-  const NaiveFit fit = finished<NaiveFit>([&, from = parameters_from(start)](Monitor& monitor) {
-    return fit_naively(*measurement, from, every, threads, monitor);
+  const NaiveFit fit = finished<NaiveFit>([=, from = parameters_from(start)](Monitor& monitor) {
+    return fit_naively(samples_for_others(*measurement, bins, threads), from, threads, monitor);
   });
   return py::dict(
       "parameters"_a = to_dict(fit.parameters),
       "error"_a = to_dict(error_figures(*measurement, fit.parameters, thread_count(threads))),
-      "bins"_a = fit.bins, "iterations"_a = fit.iterations,
+      "bins"_a = fit.bins, "iterations"_a = fit.iterations, "converged"_a = fit.converged,
       "touched"_a = static_cast<double>(fit.passes) * fit.bins, "seconds"_a = fit.seconds);
 }
 
@@ -587,17 +613,20 @@ void bind_methods(py::module_& module) {
       },
       py::arg("measurement"), py::arg("threads") = 0,
       "Where the fit of the interpolated model with Fresnel by L1 begins, as parameters.");
-  module.def("l1_terms", &l1_terms, py::arg("measurement"),
+  module.def("l1_problem", &l1_problem, py::arg("measurement"), py::arg("bins") = 0,
              "What that fit ends on: the unit of reflectance in 1/sr and, in this unit, the "
              "smoothing of |r| and the bounds of rho_d/pi and k_s of three channels, log s, alpha "
-             "and log(eta - 1).");
+             "and log(eta - 1). Its columns are those of about so many bins, drawn and weighted so "
+             "that their optimum is that of all, or of all (0): the lobe's coordinates, the weight "
+             "and red, green and blue as measured.");
   module.def("fit_by", &fit_by, py::arg("measurement"), py::arg("schedule"), py::arg("threads") = 0,
              "The interpolated model with Fresnel by L1: parameters, error, bins that the last "
-             "step saw, iterations, and touched, the bins of all passes together.");
+             "step saw, iterations, converged, and touched, the bins of all passes together.");
   module.def("fit_naively", &fit_naively_by, py::arg("measurement"), py::arg("start"),
-             py::arg("every") = 1, py::arg("threads") = 0,
-             "The same by Ceres with a residual block for each channel of one in `every` bins; "
-             "also seconds, without those of the error figures.");
+             py::arg("bins") = 0, py::arg("threads") = 0,
+             "The same by Ceres with a residual block for each channel of about so many bins, "
+             "drawn as in l1_problem; also seconds, without those of drawing and of the error "
+             "figures.");
   module.def(
       "error_figures",
       [](const Measurement& measurement, const py::dict& parameters) {

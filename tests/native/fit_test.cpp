@@ -160,11 +160,12 @@ TEST(Fit, PolishIsNoWorseThanStages) {
   for (const char* name : {"nickel", "red-fabric2"}) {
     const Measurement sample = sample_measurement(name);
     FitOptions options;
-    const double polished = fit_of(sample, options).errors.l1.pooled;
+    options.max_angle_degrees = 60;  // on all bins the stages take hundreds of slow iterations
+    const double polished = fit_of(sample, options).stages.back().error;
     options.schedule = Schedule::stages;
     const Fit staged = fit_of(sample, options);
     EXPECT_EQ(staged.stages.size(), 3u);
-    EXPECT_LE(polished, staged.errors.l1.pooled * (1 + 1e-6)) << name;
+    EXPECT_LE(polished, staged.stages.back().error * (1 + 1e-6)) << name;
   }
 }
 

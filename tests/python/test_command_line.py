@@ -99,6 +99,31 @@ def test_a_file_without_permission_is_named(tmp_path, capfd):
     assert "ermission" in refuse(capfd, "info", path)
 
 
+OPTIONS_OF_FITS = [
+    ["--uncertainty"],
+    ["--no-fresnel"],
+    ["--norm", "cosine-l1"],  # which is the default
+    ["--max-angle", "80"],
+]
+
+
+@pytest.mark.parametrize("option", OPTIONS_OF_FITS, ids=lambda option: option[0])
+def test_an_option_of_a_fit_is_refused_where_nothing_is_fitted(tmp_path, record, capfd, option):
+    place, output = tmp_path / "gold.json", tmp_path / "out.json"
+    record.save(place)
+    err = refuse(capfd, "closures", place, *option, "-o", output)
+    assert str(place) in err and option[0] in err and "found a record" in err
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("command", ["preview", "report"])
+def test_a_norm_does_not_change_the_picture_of_a_record(tmp_path, record, capfd, command):
+    record.save(tmp_path / "gold.json")
+    output = tmp_path / "out"
+    assert "--norm" in refuse(capfd, command, tmp_path / "gold.json", "--norm", "l2", "-o", output)
+    assert not output.exists()
+
+
 def test_an_empty_folder_has_nothing_to_fit(tmp_path, capfd):
     err = refuse(capfd, "fit", tmp_path, "-o", tmp_path / "out")
     assert "expected files named *.binary" in err

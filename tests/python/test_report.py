@@ -123,9 +123,10 @@ def test_without_blender_the_page_says_that_no_cost_was_measured(record, tmp_pat
 
 
 TRIALS = [
-    Trial("polish", 0.1, 0.2, 0.15, 1, 1000, 12, 9.0),
-    Trial("stages", 0.102, 0.204, 0.5, 1, 1000, 10, 30.0),
-    Trial("ceres", 0.1001, 0.2002, 0.9, 101, 10, 40, 120.0),
+    Trial("polish", 0.1, 0.2, 0.15, 1, 1000, 12, 9.0, True),
+    Trial("stages", 0.102, 0.204, 0.5, 1, 1000, 10, 30.0, True),
+    Trial("ceres", 0.1001, 0.2002, 0.9, 101, 10, 40, 120.0, True),
+    Trial("scipy", 0.11, 0.22, 0.9, 101, 10, 40, 120.0, True),
 ]
 
 
@@ -136,12 +137,15 @@ def test_methods_are_plotted_by_error_and_run_time(record, tmp_path):
     parser.feed(page)
     assert parser.open == []
     assert 'aria-label="L1 over the least, per cent over seconds"' in page
-    assert " min, 606 times as long" in page and "90.9, extrapolated" in page
+    assert " min, 606 times as long" in page and "90.9</td><td>extrapolated from 0.90" in page
     assert "+2.000 %" in page and "+0.100 %" in page
+    # Drawn bins do not explain 10 %; the stages end at 2 % because that is where they lead.
+    assert "40, did not converge" in page and "10, did not converge" not in page
     assert [line["method"] for line in csv.DictReader((tmp_path / "methods.csv").open())] == [
         "polish",
         "stages",
         "ceres",
+        "scipy",
     ]
 
 

@@ -117,4 +117,4 @@ def _by_view(model: str, fit: Fit, color: str) -> Line:
         + ("nothing measured" if error is None else f"{error:.3g}")
         for (low, high), error in zip(itertools.pairwise(ends), errors, strict=True)
     ]
-    return Line(preview.TITLES[model], middles, errors, color, dots=dots)
+    return Line(preview.TITLES[model], middles, errors, color, dashed=True, dots=dots)

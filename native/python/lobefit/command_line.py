@@ -28,7 +28,7 @@ from lobefit.inputs import (
     spread,
 )
 from lobefit.origin import origin_of, write_samples
-from lobefit.record import MODELS, SCHEDULES, VISUAL_NORM, Fit, Record
+from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
@@ -94,6 +94,20 @@ def progress_bar(name: str) -> Iterator[Progress | None]:
     finally:
         sys.stderr.write("\r\033[K")
         sys.stderr.flush()
+
+
+class _FitOption(argparse.Action):
+    """Stores a value, or the constant of a flag, and that it was given: a record needs no fit."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        setattr(namespace, self.dest, self.const if self.nargs == 0 else values)
+        namespace.given_for_fits = [*namespace.given_for_fits, option_string]
 
 
 class _Parser(argparse.ArgumentParser):
@@ -173,7 +187,9 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--uncertainty",
-        action="store_true",
+        action=_FitOption,
+        nargs=0,
+        const=True,
         help="also how well the data determine the parameters (up to 3 more times as long)",
     )
     where = command.add_mutually_exclusive_group()
@@ -215,24 +231,21 @@ def _add_closure_options(command: argparse.ArgumentParser) -> None:
 
 
 def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) -> None:
-    command.set_defaults(uncertainty=False)
+    command.set_defaults(uncertainty=False, given_for_fits=[])
     group = command.add_argument_group("fit of a measured file")
-    group.add_argument("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
-    group.add_argument("--no-fresnel", dest="fresnel", action="store_false")
-    group.add_argument("--schedule", choices=SCHEDULES, default="polish", help=_DEFAULT)
-    group.add_argument(
-        "--norm", choices=("l1", "cosine-l1", "l2", "log-l2"), default=norm, help=_DEFAULT
-    )
-    group.add_argument(
+    add = partial(group.add_argument, action=_FitOption)
+    add("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
+    add("--no-fresnel", dest="fresnel", nargs=0, const=False, default=True)
+    add("--schedule", choices=SCHEDULES, default="polish", help=_DEFAULT)
+    add("--norm", choices=NORMS, default=norm, help=_DEFAULT)
+    add(
         "--max-angle",
         type=_within(float, 1, 90, "degrees"),
         default=90.0,
         metavar="DEG",
         help="leave out beyond; " + _DEFAULT,
     )
-    group.add_argument(
-        "--channels", choices=("shared", "separate"), default="shared", help=_DEFAULT
-    )
+    add("--channels", choices=("shared", "separate"), default="shared", help=_DEFAULT)
     group.add_argument(
         "--threads",
         type=_within(int, 0, 1024, "a number"),
@@ -436,6 +449,7 @@ def _write_records(
     output, fitted = Path(options.output), _fit_options(options)
     one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
     paths = spread(options.files, suffixes)
+    _refuse_idle_options(options, paths)
     way = on_cluster(options.scheduler) if options.scheduler else in_processes(options.jobs)
     if one:
         tasks = [Task(paths[0], output, closures, fitted)]
@@ -464,6 +478,16 @@ def _write_records(
 def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
     names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
     return {name: getattr(options, name) for name in (*names, "uncertainty")}
+
+
+def _refuse_idle_options(options: argparse.Namespace, paths: Sequence[Path]) -> None:
+    """Raises InputError for options of a fit where every file is a record, which has its fit."""
+    if options.given_for_fits and all(path.suffix.lower() == RECORD_SUFFIX for path in paths):
+        option = options.given_for_fits[0]
+        raise InputError(
+            f"{paths[0]}: expected a measured file to fit with {option}, found a record, which "
+            "keeps its fit."
+        )
 
 
 def _record(path: Path, options: argparse.Namespace, closures: Sequence[Closures] = ()) -> Record:
@@ -501,6 +525,7 @@ def _print_fit(record: Record, place: Path) -> None:
 def _records(options: argparse.Namespace, records: list[Record]) -> int:
     """Collects in `records` what the files of a command line stand for."""
     paths = spread(options.files, (RECORD_SUFFIX,))
+    _refuse_idle_options(options, paths)
     return for_each(paths, lambda path: records.append(_record(path, options)))
 
 
@@ -518,6 +543,7 @@ def _preview(options: argparse.Namespace) -> int:
 
 def _material(options: argparse.Namespace) -> int:
     blender.need_blender()
+    _refuse_idle_options(options, [Path(options.file)])
     place_to_write(options.output)
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     requests = closures_for(options.kind, options.closures, tolerance, options.cap_albedo)
@@ -566,7 +592,8 @@ def _report(options: argparse.Namespace) -> int:
             records = [_with_closures(record) for record in records]
             ways = {record.name: pictures.measure(record) for record in records}
         trials = {record.name: _trials(record, options.threads) for record in records}
-        report.write(options.output, records, ways=ways, trials=trials)
+        with progress_bar("report") as progress:
+            report.write(options.output, records, ways=ways, trials=trials, progress=progress)
         print(Path(options.output) / "index.html")
     return code
 

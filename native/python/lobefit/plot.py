@@ -8,6 +8,8 @@ from html import escape
 _WIDTH, _HEIGHT = 460, 250
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 14, 14, 44
 _DECADES = 6  # of a logarithmic axis
+_DASH, _SPACE = 5, 7
+_SHIFT = (_DASH + _SPACE) / 3  # of the dashes of a line from those of the line before
 
 
 @dataclass(frozen=True)
@@ -51,8 +53,9 @@ def plot(
 ) -> str:
     """The lines over common axes, as an SVG element.
 
-    The x axis begins and ends with `x_ticks`, and goes from 0 to the last x without them. The y
-    axis is linear from 0, or logarithmic over at most `_DECADES`, below which lines are parted.
+    The x axis begins and ends with `x_ticks`, and goes from 0 to a round number without them. The
+    y axis is linear from 0, or logarithmic over at most `_DECADES`, below which lines are parted.
+    Dashed lines are shifted along themselves, so that of those that coincide each is seen.
     """
     known = [
         (x, y)
@@ -62,12 +65,12 @@ def plot(
     ]
     if not known:
         return ""
-    last = x_ticks[-1] if x_ticks else max(x for x, _ in known)
-    x_scale = _Scale(x_ticks or [tick for tick in _ticks(last) if tick <= last], last)
+    x_ticks = x_ticks or _ticks(max(x for x, _ in known))
+    x_scale = _Scale(x_ticks, x_ticks[-1])
     heights = [y for _, y in known]
     y_ticks = _decades(min(heights), max(heights)) if log else _ticks(max(heights))
     axes = _Axes(x_scale, _Scale(y_ticks, y_ticks[-1], log))
-    drawn = axes.grid() + "".join(axes.curve(line) for line in lines)
+    drawn = axes.grid() + "".join(axes.curve(line, index) for index, line in enumerate(lines))
     return framed(drawn, x_title, y_title, _WIDTH, _HEIGHT)
 
 
@@ -114,9 +117,9 @@ class _Axes:
             parts.append(f'<text x="{x:.1f}" y="{y + 16:.1f}" class="middle">{tick:g}</text>')
         return "".join(parts)
 
-    def curve(self, line: Line) -> str:
+    def curve(self, line: Line, index: int) -> str:
         path, pen_down, dots, marks = [], False, [], []
-        for index, (x, y) in enumerate(zip(line.x, line.y, strict=True)):
+        for point, (x, y) in enumerate(zip(line.x, line.y, strict=True)):
             if y is None or not self._y.holds(y):
                 pen_down = False
                 continue
@@ -126,21 +129,22 @@ class _Axes:
             if line.dots:
                 dots.append(
                     f'<circle cx="{at[0]:.1f}" cy="{at[1]:.1f}" r="3.5" fill="{line.color}">'
-                    f"<title>{escape(line.dots[index])}</title></circle>"
+                    f"<title>{escape(line.dots[point])}</title></circle>"
                 )
             if line.marks:
                 # At the right edge there is no room on the right.
                 side, shift = ("end", -7) if at[0] > 0.8 * _WIDTH else ("start", 7)
                 marks.append(
                     f'<text x="{at[0] + shift:.1f}" y="{at[1] - 5:.1f}" text-anchor="{side}">'
-                    f"{escape(line.marks[index])}</text>"
+                    f"{escape(line.marks[point])}</text>"
                 )
-        stroke = f'stroke="{line.color}"{_dashes(line)}'
+        offset = f' stroke-dashoffset="{_SHIFT * index:.2f}"' if line.dashed else ""
+        stroke = f'stroke="{line.color}"{_dashes(line)}{offset}'
         return f'<path class="curve" d="{"".join(path)}" {stroke}/>' + "".join(dots + marks)
 
 
 def _dashes(line: Line) -> str:
-    return ' stroke-dasharray="5 4"' if line.dashed else ""
+    return f' stroke-dasharray="{_DASH} {_SPACE}"' if line.dashed else ""
 
 
 def _decades(low: float, high: float) -> list[float]:

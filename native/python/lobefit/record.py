@@ -20,6 +20,7 @@ SCHEMA = 1
 MODELS = ("modified-phong", "modified-blinn-phong", "interpolated")
 # How a fit goes about it; see `Job`.
 SCHEDULES = ("stages", "polish", "joint", "subsample")
+NORMS = ("l1", "cosine-l1", "l2", "log-l2")
 ERRORS = ("l1", "relative_l1", "relative_l1_80", "relative_l1_cosine")
 
 _CHANNELS = ("red", "green", "blue", "")
@@ -465,7 +466,7 @@ _RECORD = _fit(
             {"name": _TEXT},
         ),
         "schedule": _choice(*SCHEDULES),
-        "norm": _choice("l1", "cosine-l1", "l2", "log-l2"),
+        "norm": _choice(*NORMS),
         "channels": _choice("shared", "separate"),
         "max_angle": _number(0, 90, "a number from 0 to 90"),
     },

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lobefit import angles, methods, picture, pictures, preview
 from lobefit.atomic import make_folder, write_bytes
+from lobefit.inputs import Progress
 from lobefit.methods import Trial
 from lobefit.pictures import Picture
 from lobefit.plot import Line, legend, plot
@@ -42,6 +43,7 @@ _METHODS = {
     "scipy": "#c2571a",
 }
 _LEAST_EXCESS = 0.01  # per cent of L1; methods that are closer to each other are equally good
+_MOST_EXCESS = 1.0  # per cent; bins drawn for the slow methods do not explain more than this
 _CHANNELS = (("red", "#c8402f"), ("green", "#3b8f3e"), ("blue", "#3166c4"))
 _ERROR_TITLES = {
     "l1": "mean |f &minus; m|",
@@ -67,9 +69,11 @@ img { display: block; max-width: 100%; height: auto; border-radius: 6px; margin:
 .side > div { flex: 1 1 400px; max-width: 560px }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem }
 th { text-align: left; font-weight: 600 } td, th { padding: .22rem .9rem .22rem 0;
-  border-bottom: 1px solid var(--line); vertical-align: top }
+  border-bottom: 1px solid var(--line); vertical-align: top; white-space: nowrap }
 tr.own td { font-weight: 600 } code { font-size: .85rem; overflow-wrap: anywhere }
-.plot { width: 100%; height: auto } .plot text { fill: var(--faint); font-size: 11px }
+.plot { width: 100%; height: auto; overflow: visible }
+.plot text { fill: var(--faint); font-size: 11px; paint-order: stroke; stroke: var(--paper);
+  stroke-width: 3px; stroke-linejoin: round }
 .plot .middle { text-anchor: middle } .plot .end { text-anchor: end }
 .plot .name { fill: var(--ink); font-weight: 600 }
 .grid { stroke: var(--line) } .curve { fill: none; stroke-width: 2 }
@@ -95,19 +99,21 @@ def write(
     failures: Iterable[str] = (),
     ways: Mapping[str, Sequence[Picture]] | None = None,
     trials: Mapping[str, Sequence[Trial]] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Writes index.html, report.csv and, of records with `ways` or `trials`, a table of these.
 
     `renderings`, `ways` to show (see `pictures.measure`) and `trials` of methods (see
     `methods.compare`) are found by a record's name; the tables are pictures.csv and methods.csv.
+    `progress` is called before each record is drawn, and an exception out of it ends the writing.
     """
+    text = page(records, renderings or {}, failures, ways or {}, trials or {}, progress)
     place = make_folder(folder)
     write_bytes(place / "report.csv", table(records).encode())
     if ways:
         write_bytes(place / "pictures.csv", pictures.table(ways).encode())
     if trials:
         write_bytes(place / "methods.csv", methods.table(trials).encode())
-    text = page(records, renderings or {}, failures, ways or {}, trials or {})
     write_bytes(place / "index.html", text.encode())
 
 
@@ -135,8 +141,18 @@ def page(
     failures: Iterable[str],
     ways: Mapping[str, Sequence[Picture]],
     trials: Mapping[str, Sequence[Trial]],
+    progress: Progress | None = None,
 ) -> str:
     """The whole page; it refers to nothing outside of itself."""
+
+    def section(index: int, record: Record) -> str:
+        if progress:
+            progress(index / len(records), f"Drawing {record.name}")
+        name = record.name
+        return _section(
+            index, record, renderings.get(name), ways.get(name, ()), trials.get(name, ())
+        )
+
     body = [
         "<h1>Measured materials as Phong lobes</h1>",
         '<p class="faint">Fits of the models of Nielsen et al., &ldquo;Addressing Grazing Angle '
@@ -144,16 +160,7 @@ def page(
         "from behind at the lower left, each row at one exposure.</p>",
         *(f'<p class="warning">{escape(failure)}</p>' for failure in failures),
         _overview(records),
-        *(
-            _section(
-                index,
-                record,
-                renderings.get(record.name),
-                ways.get(record.name, ()),
-                trials.get(record.name, ()),
-            )
-            for index, record in enumerate(records)
-        ),
+        *(section(index, record) for index, record in enumerate(records)),
     ]
     head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
     title = "<title>Lobefit report</title>"
@@ -309,11 +316,17 @@ def _trials(trials: Sequence[Trial]) -> str:
     least = min(trial.l1 for trial in trials)
     own = next(trial.seconds for trial in trials if trial.method == "polish")
     excess = {trial.method: 100 * (trial.l1 / least - 1) if least else 0.0 for trial in trials}
+    failed = {
+        trial.method
+        for trial in trials
+        if not trial.converged or (trial.extrapolated and excess[trial.method] > _MOST_EXCESS)
+    }
     points = [
         Point(
             methods.TITLES[trial.method],
             _duration(trial.seconds_of_all)
-            + (f", {trial.seconds_of_all / own:.0f} times as long" if trial.extrapolated else ""),
+            + (f", {trial.seconds_of_all / own:.0f} times as long" if trial.extrapolated else "")
+            + (", did not converge" if trial.method in failed else ""),
             trial.seconds_of_all,
             excess[trial.method],
             _METHODS[trial.method],
@@ -322,16 +335,17 @@ def _trials(trials: Sequence[Trial]) -> str:
         )
         for trial in trials
     ]
-    head = ["method", "L1 over the least", "relative L1", "seconds", "of Lobefit"]
+    head = ["method", "L1 over the least", "relative L1", "seconds", "which are", "of Lobefit"]
     rows = [
         [
             methods.TITLES[trial.method],
             f"+{excess[trial.method]:.3f} %",
             _number(trial.relative_l1),
-            _short(trial.seconds_of_all) + (", extrapolated" if trial.extrapolated else ""),
+            _short(trial.seconds_of_all),
+            f"extrapolated from {_short(trial.seconds)}" if trial.extrapolated else "measured",
             _short(trial.seconds_of_all / own),
             f"{trial.bins:,}",
-            str(trial.iterations),
+            f"{trial.iterations}{', did not converge' if trial.method in failed else ''}",
             f"{trial.passes:.3g}",
         ]
         for trial in trials
@@ -339,12 +353,14 @@ def _trials(trials: Sequence[Trial]) -> str:
     shown = scatter(points, "seconds", "L1 over the least, per cent", _LEAST_EXCESS)
     note = (
         '<p class="faint">Nine parameters of the interpolated model with Fresnel, fitted by plain '
-        "L1 in this run, reading not counted; the error is that of all bins. A ring stands for all "
-        "bins; its time was reckoned from the dot it hangs on, a fit to one bin in "
-        f"{methods.THINNED}. Ceres and scipy begin at the best start of Lobefit's scan, which "
-        "costs them nothing.</p>"
+        "L1 in this run, reading not counted; the error is that of all bins. Ceres and scipy begin "
+        "at the best start of Lobefit's scan, which costs them nothing. They fit some "
+        f"{methods.DRAWN:,} bins, drawn like those of Lobefit's own subsample and weighted so that "
+        "their optimum is that of all bins to about .1 %; the time of all (the ring) is "
+        "extrapolated by the number of bins from the time they took (the dot). One that still ends "
+        f"more than {_MOST_EXCESS:g} % above the least did not converge.</p>"
     )
-    counts = ["bins at the end", "iterations", "passes over the bins"]
+    counts = ["bins at the end", "iterations", "passes"]
     return f"{shown}{note}{_table([*head, *counts], rows)}"
 
 
@@ -413,7 +429,8 @@ def _albedo_plot(record: Record) -> str:
             values = [entry[index] for entry in record.albedo[kind]]
             angles = record.albedo["view_angle"]
             lines.append(Line(f"{kind}, {channel}", angles, values, color, kind == "model"))
-    return plot(lines, "view angle in degrees", "albedo") + legend(lines)
+    drawn = plot(lines, "view angle in degrees", "albedo", x_ticks=range(0, 91, 15))
+    return drawn + legend(lines)
 
 
 def _facts(record: Record, rendering: Rendering | None) -> str:

@@ -120,15 +120,14 @@ class _Scene:
                 (x - gap - wide, y - high / 2 - distance),
                 (x - wide / 2, y + gap + distance),
             ):
+                left = min(max(left, _LEFT), _WIDTH - wide)
                 box = (left, top, left + wide, top + high)
                 if self._is_free(box):
                     yield box
         yield x + gap, y - gap - high, x + gap + wide, y - gap
 
     def _is_free(self, box: Box) -> bool:
-        inside = (
-            box[0] >= _LEFT and box[1] >= 0 and box[2] <= _WIDTH and box[3] <= _HEIGHT - _BOTTOM
-        )
+        inside = box[1] >= 0 and box[3] <= _HEIGHT - _BOTTOM
         return inside and not any(
             box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
             for other in self._taken
