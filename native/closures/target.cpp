@@ -126,15 +126,17 @@ Target sample_target(const Reflectance& f) {
 Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride) {
   Target result;
   std::size_t next = 0;  // counts on from view to view, so that no azimuth is preferred
-  for (std::size_t i = view_stride / 2; i < target.size(); i += view_stride) {
-    const TargetView& from = target[i];
-    TargetView view{from.wo, {}};
-    for (; next < from.lights.size(); next += light_stride) {
-      view.lights.push_back(from.lights[next]);
+  const std::size_t first = std::min(view_stride, target.size()) / 2;
+  for (std::size_t i = first; i < target.size(); i += view_stride) {
+    const std::vector<TargetLight>& lights = target[i].lights;
+    TargetView view{target[i].wo, {}};
+    // A view with fewer lights than are skipped keeps its last.
+    for (next = std::min(next, lights.size() - 1); next < lights.size(); next += light_stride) {
+      view.lights.push_back(lights[next]);
       view.lights.back().weight *= static_cast<double>(view_stride * light_stride);
     }
-    next -= from.lights.size();
-    if (!view.lights.empty()) result.push_back(std::move(view));
+    next -= lights.size();
+    result.push_back(std::move(view));
   }
   return result;
 }

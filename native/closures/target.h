@@ -38,7 +38,8 @@ using Target = std::vector<TargetView>;
 // black or nowhere known.
 Target sample_target(const Reflectance& f);
 
-// The same with every so many-th view and light alone, which stand for the others.
+// The same with every so many-th view and light alone, which stand for the others; at least one of
+// each.
 Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride);
 
 // sum weight |approximation - reflected|, for f cos of an approximation in the same frame.

@@ -376,6 +376,17 @@ TEST(ClosuresFit, CapsTheAlbedoWhereItIsAskedTo) {
   EXPECT_LE(greatest(true), 1.005);
 }
 
+TEST(ClosuresFit, ASingleViewAngleWithAFewLightsIsEnough) {
+  const Target whole = sample_target(reflectance_of(known_closures()));
+  Target single = {whole[20]};
+  single.front().lights.resize(3);
+  const double black =
+      error_of(single, [](const Vector3&, const Vector3&) { return Rgb(Rgb::Zero()); });
+  for (const int specular : {0, 1, 2, 3}) {
+    EXPECT_LT(fitted(single, {.specular = specular}).error, black) << specular;
+  }
+}
+
 TEST(ClosuresFit, BlackNeedsNoClosures) {
   const Target target =
       sample_target([](const Vector3&, const Vector3&) { return Rgb(Rgb::Zero()); });
