@@ -110,7 +110,8 @@ double view_error(const ClosureCurves& closures, const TargetView& view, double 
   return error;
 }
 
-// Gradient and reweighted least squares' matrix of view_error by the curves' values at the view.
+// Gradient and reweighted least squares' matrix, its lower half, of view_error by the curves'
+// values at the view.
 struct ViewEquations {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd gradient;
@@ -185,7 +186,6 @@ ViewEquations linearise_view(const ClosureCurves& closures, const TargetView& vi
       sum.gradient[place(j)] += gradients[static_cast<std::size_t>(c)][j];
     }
   }
-  sum.matrix.triangularView<Eigen::StrictlyUpper>() = sum.matrix.transpose();
   return sum;
 }
 

@@ -118,7 +118,8 @@ class Search {
       look_for(specular - 1, {}, 0, 0.25);
       starts = extended(found_.front().closures);
     }
-    const ViewPaths paths = look_for(specular, std::move(starts), 0.25, 0.5);
+    const double begun = starts.empty() ? 0 : 0.25;
+    const ViewPaths paths = look_for(specular, std::move(starts), begun, 0.5);
     monitor_.report("Fitting closures", 0.5);
     follow(full_, 0.03, 20);
     keep(2);

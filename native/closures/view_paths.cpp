@@ -35,23 +35,20 @@ ViewPaths::ViewPaths(const Target& views, const std::vector<ClosureCurves>& star
     found[start][view] = optimum(view, starts[start], monitor);
   });
   for (Optima& of_start : found) {
-    const auto& choice = of_start.front().closures.distributions;
-    auto known = std::find_if(by_choice_.begin(), by_choice_.end(), [&](const OptimaByView& other) {
-      return other.front().front().closures.distributions == choice;
-    });
-    if (known == by_choice_.end()) known = by_choice_.emplace(known, views_.size());
+    OptimaByView& optima = by_distributions_[of_start.front().closures.distributions];
+    optima.resize(views_.size());
     for (std::size_t view = 0; view < views_.size(); ++view) {
-      (*known)[view].push_back(std::move(of_start[view]));
+      optima[view].push_back(std::move(of_start[view]));
     }
   }
-  for (OptimaByView& optima : by_choice_) {
+  for (auto& [distributions, optima] : by_distributions_) {
     for (Optima& of_view : optima) of_view = distinct(std::move(of_view));
   }
 }
 
 std::vector<ClosureCurves> ViewPaths::paths() const {
   std::vector<ClosureCurves> all;
-  for (const OptimaByView& optima : by_choice_) {
+  for (const auto& [distributions, optima] : by_distributions_) {
     for (ClosureCurves& closures : ways(optima)) all.push_back(std::move(closures));
   }
   return all;
@@ -64,11 +61,9 @@ std::vector<ClosureCurves> ViewPaths::detours(const ClosureCurves& closures,
     const auto view = static_cast<std::size_t>(job);
     own[view] = optimum(view, constant_at(closures, views_[view].front().wo.z()), monitor);
   });
-  const auto known =
-      std::find_if(by_choice_.begin(), by_choice_.end(), [&](const OptimaByView& optima) {
-        return optima.front().front().closures.distributions == closures.distributions;
-      });
-  OptimaByView optima = known == by_choice_.end() ? OptimaByView(views_.size()) : *known;
+  const auto known = by_distributions_.find(closures.distributions);
+  OptimaByView optima =
+      known == by_distributions_.end() ? OptimaByView(views_.size()) : known->second;
   for (std::size_t view = 0; view < views_.size(); ++view) {
     optima[view].insert(optima[view].begin(), std::move(own[view]));
   }

@@ -1,6 +1,7 @@
 // Ways through the best closures of single view angles: starts for curves that fit all of them.
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "closures/closure_problem.h"
@@ -44,8 +45,8 @@ class ViewPaths {
   static Optima in_every_order(const Optimum& optimum);
   static double jump(const Optimum& from, const Optimum& to);
 
-  std::vector<Target> views_;            // each of one view
-  std::vector<OptimaByView> by_choice_;  // of distributions
+  std::vector<Target> views_;  // each of one view
+  std::map<std::vector<Distribution>, OptimaByView> by_distributions_;
   int threads_;
 };
 

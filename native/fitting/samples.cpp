@@ -24,6 +24,29 @@ double quantile(std::vector<double>& values, double share) {
   return *at;
 }
 
+// The unit of the values: the median of the valid ones of all channels, found from one in `stride`,
+// which tell it well enough. Where it is next to nothing beside the brightest (a lobe on black) it
+// is their mean, to which a few damaged bins add little; of an all-zero table it is 1.
+double typical_reflectance(const Measurement& measurement, std::size_t stride = 61) {
+  constexpr std::size_t enough = 1000;
+  constexpr double next_to_nothing = 1e-12;
+  const auto planes = measurement.planes();
+  std::vector<double> values;
+  for (std::size_t i = 0; i < planes.size(); i += stride) {
+    if (!std::isnan(planes[i])) values.push_back(planes[i]);
+  }
+  if (values.size() < enough && stride > 1) return typical_reflectance(measurement, 1);
+  if (values.empty()) return 1;
+  const double bright = quantile(values, 0.999), median = quantile(values, 0.5);
+  if (median > next_to_nothing * bright) return median;
+  if (stride > 1) return typical_reflectance(measurement, 1);
+  double mean = 0;
+  for (const double value : values) {
+    mean += std::min(value, bright / next_to_nothing) / static_cast<double>(values.size());
+  }
+  return mean > 0 ? mean : 1;
+}
+
 // Calls visit(column) for every column; columns differ in type.
 template <typename Visit>
 void for_each_column(Samples& s, const Visit& visit) {
@@ -172,26 +195,6 @@ void measure_importance(const Samples& samples, const Samples::Run& run, float* 
 }
 
 }  // namespace
-
-double typical_reflectance(const Measurement& measurement, std::size_t stride) {
-  constexpr std::size_t enough = 1000;
-  constexpr double next_to_nothing = 1e-12;
-  const auto planes = measurement.planes();
-  std::vector<double> values;
-  for (std::size_t i = 0; i < planes.size(); i += stride) {
-    if (!std::isnan(planes[i])) values.push_back(planes[i]);
-  }
-  if (values.size() < enough && stride > 1) return typical_reflectance(measurement, 1);
-  if (values.empty()) return 1;
-  const double bright = quantile(values, 0.999), median = quantile(values, 0.5);
-  if (median > next_to_nothing * bright) return median;
-  if (stride > 1) return typical_reflectance(measurement, 1);
-  double mean = 0;
-  for (const double value : values) {
-    mean += std::min(value, bright / next_to_nothing) / static_cast<double>(values.size());
-  }
-  return mean > 0 ? mean : 1;
-}
 
 Samples all_samples(const Measurement& measurement, const FitOptions& options) {
   return Builder(measurement, options).build();

@@ -55,15 +55,10 @@ struct Samples {
   SampleColumn<float> weight;  // of each of the two measured values
   // measured[channel][half]: f, or log(f + log_offset) for Norm::log_l2.
   std::array<std::array<SampleColumn<float>, 2>, 3> measured;
-  double unit = 1;  // in 1/sr
+  double unit = 1;  // the median reflectance or what stands for it, in 1/sr
 
   std::size_t size() const { return weight.size(); }
 };
-
-// The unit of the values: the median of the valid ones of all channels, found from one in `stride`,
-// which tell it well enough. Where it is next to nothing beside the brightest (a lobe on black) it
-// is their mean, to which a few damaged bins add little; of an all-zero table it is 1.
-double typical_reflectance(const Measurement& measurement, std::size_t stride = 61);
 
 // All bins above the horizon and up to options.max_angle_degrees; invalid ones weigh 0.
 Samples all_samples(const Measurement& measurement, const FitOptions& options);
