@@ -1,8 +1,10 @@
 #include "closures/closure_problem.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "closures/band_matrix.h"
+#include "closures/closure_kernel.h"
 
 namespace lobefit {
 namespace {
@@ -13,26 +15,6 @@ using enum ClosureLayout::ShapeCurve;
 // loses the peak of a lobe much narrower than this.
 const double least_log_alpha = std::log(0.002);
 
-struct Bounds {
-  Eigen::VectorXd least, greatest;
-};
-
-Bounds bounds_of(const ClosureLayout& layout) {
-  Bounds bounds{Eigen::VectorXd::Zero(layout.unknowns()),
-                Eigen::VectorXd::Constant(layout.unknowns(), 1e6)};
-  const int n = layout.coefficients;
-  for (int k = 0; k < layout.specular; ++k) {
-    const auto set = [&](int curve, double least, double greatest) {
-      bounds.least.segment(layout.shape(k, curve) * n, n).setConstant(least);
-      bounds.greatest.segment(layout.shape(k, curve) * n, n).setConstant(greatest);
-    };
-    set(mean, least_log_alpha, 0);
-    set(spread, -3, 3);
-    set(bend, -3, 3);
-  }
-  return bounds;
-}
-
 // The values of all curves at one view angle.
 struct AtView {
   Eigen::VectorXd curves;
@@ -40,11 +22,8 @@ struct AtView {
 };
 
 AtView at_view(const ClosureCurves& closures, double cosine) {
-  const ClosureLayout& layout = closures.layout;
-  const auto [first, share] = ViewSplines::at(cosine, layout.coefficients);
-  const Eigen::Map<const Eigen::MatrixXd> coefficients(closures.x.data(), layout.coefficients,
-                                                       layout.curves());
-  return {coefficients.middleRows(first, share.size()).transpose() * share,
+  const auto [first, share] = ViewSplines::at(cosine, closures.coefficients());
+  return {closures.x.middleCols(first, share.size()) * share,
           std::sqrt(std::max(0.0, 1 - cosine * cosine))};
 }
 
@@ -79,129 +58,109 @@ ClippedShape clipped_shape(const AtView& at, const ClosureLayout& layout, int cl
   return result;
 }
 
-// |r| made smooth, sqrt(r^2 + e^2) - e, without loss of digits where r is small.
-double smooth(double r, double e) { return r * r / (std::sqrt(r * r + e * e) + e); }
-
 Microfacet microfacet(const ClosureCurves& closures, int closure, const Shape& shape,
                       const Vector3& wo) {
   return {closures.distributions[static_cast<std::size_t>(closure)], shape, wo};
 }
 
-double view_error(const ClosureCurves& closures, const TargetView& view, double smoothing) {
-  const ClosureLayout& layout = closures.layout;
-  const AtView at = at_view(closures, view.wo.z());
-  std::vector<Microfacet> specular;
-  for (int k = 0; k < layout.specular; ++k) {
-    const Shape shape = clipped_shape(at, layout, k, view.wo.z()).shape;
-    specular.push_back(microfacet(closures, k, shape, view.wo));
+std::vector<ClippedShape> clipped_shapes(const ClosureCurves& closures, const AtView& at,
+                                         double cosine) {
+  std::vector<ClippedShape> shapes;
+  for (int k = 0; k < closures.layout.specular; ++k) {
+    shapes.push_back(clipped_shape(at, closures.layout, k, cosine));
   }
-  const auto weights = [&](int closure) {
-    return Rgb(at.curves.segment<3>(layout.weight(closure, 0)).array());
-  };
-  double error = 0;
-  for (const TargetLight& light : view.lights) {
-    Rgb r = weights(layout.specular) * (light.wi.z() / pi) - light.reflected;
-    for (int k = 0; k < layout.specular; ++k) {
-      r += weights(k) * specular[static_cast<std::size_t>(k)].evaluate(light.wi, light.half);
-    }
-    const double e = smoothing * light.typical;
-    error += light.weight * (smooth(r[0], e) + smooth(r[1], e) + smooth(r[2], e));
-  }
-  return error;
+  return shapes;
 }
 
-// Gradient and reweighted least squares' matrix, its lower half, of view_error by the curves'
-// values at the view.
+ClosureKernelInput kernel_input(const ClosureCurves& closures, const SearchView& view,
+                                const AtView& at, const std::vector<ClippedShape>& shapes,
+                                double smoothing) {
+  const ClosureLayout& layout = closures.layout;
+  const auto column = [&](int which) { return view.lights.col(which).data(); };
+  ClosureKernelInput input{};
+  input.count = static_cast<std::size_t>(view.lights.rows());
+  for (int c = 0; c < 3; ++c) {
+    input.wi[c] = column(SearchView::wi_x + c);
+    input.half[c] = column(SearchView::half_x + c);
+    input.reflected[c] = column(SearchView::red + c);
+    for (int k = 0; k < layout.closures(); ++k) {
+      input.weights[k][c] = at.curves[layout.weight(k, c)];
+    }
+  }
+  input.weight = column(SearchView::weight);
+  input.typical = column(SearchView::typical);
+  input.specular = layout.specular;
+  for (int k = 0; k < layout.specular; ++k) {
+    const Shape& shape = shapes[static_cast<std::size_t>(k)].shape;
+    input.closures[k] = microfacet(closures, k, shape, view.wo).terms();
+  }
+  input.smoothing = smoothing;
+  return input;
+}
+
+double view_error(const ClosureCurves& closures, const SearchView& view, double smoothing) {
+  const AtView at = at_view(closures, view.wo.z());
+  const std::vector<ClippedShape> shapes = clipped_shapes(closures, at, view.wo.z());
+  return run_closure_error(kernel_input(closures, view, at, shapes, smoothing));
+}
+
+// How a closure's ln alpha_x, ln alpha_y and tilt follow its mean, spread and bend; 0 where they
+// were clipped.
+Eigen::Matrix3d shape_by_curves(const ClippedShape& shape, double sine) {
+  Eigen::Matrix3d by = Eigen::Matrix3d::Zero();
+  const double x = shape.x_free, y = shape.y_free;
+  by.col(mean) << x, y, 0;
+  by.col(spread) << -x * sine * sine, y * sine * sine, 0;
+  by.col(bend) << 0, 0, shape.tilt_free * sine;
+  return by;
+}
+
+// Gradient and reweighted least squares' matrix of view_error by the curves' values at the view.
 struct ViewEquations {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd gradient;
 };
 
-// The number of closures is known when this is compiled, so that its inner loops unroll.
-template <int specular>
-ViewEquations linearise_view(const ClosureCurves& closures, const TargetView& view,
+ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& view,
                              double smoothing) {
-  constexpr int own = shape_curves * specular + specular + 1;
   const ClosureLayout& layout = closures.layout;
   const AtView at = at_view(closures, view.wo.z());
-  const double sine = at.sine;
-  std::vector<ClippedShape> shapes;
-  std::vector<Microfacet> microfacets;
-  for (int k = 0; k < specular; ++k) {
-    shapes.push_back(clipped_shape(at, layout, k, view.wo.z()));
-    microfacets.push_back(microfacet(closures, k, shapes.back().shape, view.wo));
-  }
-  // One channel depends on the shapes and on its own weights: the equations of the three channels
-  // are kept apart until all lights are in.
-  using Matrix = Eigen::Matrix<double, own, own>;
-  using Column = Eigen::Matrix<double, own, 1>;
-  std::array<Matrix, 3> matrices;
-  std::array<Column, 3> gradients;
-  matrices.fill(Matrix::Zero());
-  gradients.fill(Column::Zero());
-  Column row;
-  std::array<double, shape_curves * specular + 1> by_shape{};
-  for (const TargetLight& light : view.lights) {
-    for (int k = 0; k < specular; ++k) {
-      const ClippedShape& shape = shapes[static_cast<std::size_t>(k)];
-      const ShapeValue value =
-          microfacets[static_cast<std::size_t>(k)].evaluate_with_derivatives(light.wi, light.half);
-      const double by_x = shape.x_free ? value.by_log_alpha_x : 0;
-      const double by_y = shape.y_free ? value.by_log_alpha_y : 0;
-      double* const by = by_shape.data() + shape_curves * k;
-      by[mean] = value.value * (by_x + by_y);
-      by[spread] = value.value * (by_y - by_x) * sine * sine;
-      by[bend] = shape.tilt_free ? value.value * value.by_tilt * sine : 0;
-      row[shape_curves * specular + k] = value.value;
+  const std::vector<ClippedShape> shapes = clipped_shapes(closures, at, view.wo.z());
+  const ClosureKernelInput input = kernel_input(closures, view, at, shapes, smoothing);
+  const ClosureKernelSums sums = run_closure_kernel(input);
+  ViewEquations result{Eigen::MatrixXd::Zero(layout.curves(), layout.curves()),
+                       Eigen::VectorXd::Zero(layout.curves())};
+  using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  using Stride = Eigen::OuterStride<ClosureKernelSums::shapes>;
+  for (int k = 0; k < layout.specular; ++k) {
+    const Eigen::Matrix3d by_k = shape_by_curves(shapes[static_cast<std::size_t>(k)], at.sine);
+    const int row = layout.shape(k, 0);
+    result.gradient.segment<3>(row) =
+        by_k.transpose() * Eigen::Map<const Eigen::Vector3d>(sums.gradient_x + 3 * k);
+    for (int l = 0; l <= k; ++l) {
+      const Eigen::Map<const RowMajor3, 0, Stride> part(&sums.matrix_xx[3 * k][3 * l]);
+      Eigen::Matrix3d whole = part;
+      if (k == l) whole = part.selfadjointView<Eigen::Lower>();
+      const Eigen::Matrix3d by_l = shape_by_curves(shapes[static_cast<std::size_t>(l)], at.sine);
+      result.matrix.block<3, 3>(row, layout.shape(l, 0)) = by_k.transpose() * whole * by_l;
     }
-    row[own - 1] = light.wi.z() / pi;
     for (int c = 0; c < 3; ++c) {
-      double r = -light.reflected[c];
-      for (int k = 0; k <= specular; ++k) {
-        const double weight = at.curves[layout.weight(k, c)];
-        r += weight * row[shape_curves * specular + k];
-        for (int i = shape_curves * k; k < specular && i < shape_curves * (k + 1); ++i) {
-          row[i] = weight * by_shape[static_cast<std::size_t>(i)];
-        }
+      for (int l = 0; l < layout.closures(); ++l) {
+        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][3 * k]);
+        result.matrix.block<1, 3>(layout.weight(l, c), row) = input.weights[k][c] * part * by_k;
       }
-      const double e = smoothing * light.typical;
-      const double weight = light.weight / std::sqrt(r * r + e * e);
-      auto& matrix = matrices[static_cast<std::size_t>(c)];
-      for (int j = 0; j < own; ++j) {
-        const double scaled = weight * row[j];
-        for (int i = j; i < own; ++i) matrix(i, j) += scaled * row[i];
-      }
-      gradients[static_cast<std::size_t>(c)] += (weight * r) * row;
     }
   }
-  ViewEquations sum{Eigen::MatrixXd::Zero(layout.curves(), layout.curves()),
-                    Eigen::VectorXd::Zero(layout.curves())};
   for (int c = 0; c < 3; ++c) {
-    const auto place = [&](int i) {
-      return i < shape_curves * specular ? i : layout.weight(i - shape_curves * specular, c);
-    };
-    const auto& matrix = matrices[static_cast<std::size_t>(c)];
-    for (int j = 0; j < own; ++j) {
-      for (int i = j; i < own; ++i) sum.matrix(place(i), place(j)) += matrix(i, j);
-      sum.gradient[place(j)] += gradients[static_cast<std::size_t>(c)][j];
+    for (int k = 0; k < layout.closures(); ++k) {
+      result.gradient[layout.weight(k, c)] = sums.gradient_v[c][k];
+      for (int l = 0; l <= k; ++l) {
+        result.matrix(layout.weight(k, c), layout.weight(l, c)) = sums.matrix_vv[c][k][l];
+      }
     }
   }
-  return sum;
-}
-
-ViewEquations linearise_view(const ClosureCurves& closures, const TargetView& view,
-                             double smoothing) {
-  static_assert(most_specular_closures == 3);
-  switch (closures.layout.specular) {
-    case 0:
-      return linearise_view<0>(closures, view, smoothing);
-    case 1:
-      return linearise_view<1>(closures, view, smoothing);
-    case 2:
-      return linearise_view<2>(closures, view, smoothing);
-    default:
-      return linearise_view<3>(closures, view, smoothing);
-  }
+  result.matrix.triangularView<Eigen::StrictlyUpper>() = result.matrix.transpose();
+  return result;
 }
 
 // A little curvature costs a little error, so that curves are smooth where the target does not say:
@@ -210,149 +169,196 @@ constexpr double stiffness = 1e-5;
 
 // Splines of half the width have twice as many second differences for the same curve, each a
 // quarter as large: they count eight times as much, that its cost stays the same.
-double stiffness_of(const ClosureLayout& layout) {
-  return stiffness * std::pow((layout.coefficients - 3.0) / (ViewSplines::coarse - 3.0), 3);
+double stiffness_of(int coefficients) {
+  return stiffness * std::pow((coefficients - 3.0) / (ViewSplines::coarse - 3.0), 3);
+}
+
+Eigen::MatrixXd second_differences(const Eigen::MatrixXd& x) {
+  const Eigen::Index n = x.cols() - 2;
+  return x.leftCols(n) - 2 * x.middleCols(1, n) + x.rightCols(n);
 }
 
 double stiffness_penalty(const ClosureCurves& closures) {
-  const ClosureLayout& layout = closures.layout;
-  const int n = layout.coefficients;
-  double penalty = 0;
-  for (int curve = 0; curve < layout.curves(); ++curve) {
-    for (int i = 1; i + 1 < n; ++i) {
-      const double* at = closures.x.data() + curve * n + i;
-      penalty += square(at[-1] - 2 * at[0] + at[1]);
-    }
-  }
-  return stiffness_of(layout) / 2 * penalty;
+  const int n = closures.coefficients();
+  return n < 3 ? 0 : stiffness_of(n) / 2 * second_differences(closures.x).squaredNorm();
 }
 
+// The unknowns stand coefficient after coefficient, so that each meets those of three coefficients
+// after its own at most.
 struct Equations {
-  Eigen::MatrixXd matrix;
+  BandMatrix matrix;
   Eigen::VectorXd gradient;
 };
 
 void add_penalty(const ClosureCurves& closures, Equations& equations) {
-  const ClosureLayout& layout = closures.layout;
-  const int n = layout.coefficients;
+  const Eigen::Index curves = closures.x.rows(), n = closures.x.cols();
+  if (n < 3) return;
   const Eigen::Vector3d difference(1, -2, 1);
-  const Eigen::Matrix3d both = stiffness_of(layout) * difference * difference.transpose();
-  for (int curve = 0; curve < layout.curves(); ++curve) {
-    for (int i = curve * n; i + 2 < (curve + 1) * n; ++i) {
-      equations.matrix.block<3, 3>(i, i) += both;
-      equations.gradient.segment<3>(i) += both * closures.x.segment<3>(i);
+  const Eigen::Matrix3d both =
+      stiffness_of(closures.coefficients()) * difference * difference.transpose();
+  Eigen::Map<Eigen::MatrixXd> gradient(equations.gradient.data(), curves, n);
+  for (Eigen::Index i = 0; i + 2 < n; ++i) {
+    gradient.middleCols<3>(i) += closures.x.middleCols<3>(i) * both;
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      for (Eigen::Index b = 0; b <= a; ++b) {
+        for (Eigen::Index curve = 0; curve < curves; ++curve) {
+          equations.matrix((i + a) * curves + curve, (i + b) * curves + curve) += both(a, b);
+        }
+      }
     }
   }
 }
 
-// Of the matrix the lower half.
-void linearise(const Target& target, const ClosureCurves& closures, double smoothing,
-               Equations& sum) {
-  const ClosureLayout& layout = closures.layout;
-  const int unknowns = layout.unknowns(), curves = layout.curves(), n = layout.coefficients;
-  sum.matrix.setZero(unknowns, unknowns);
-  sum.gradient.setZero(unknowns);
-  for (const TargetView& view : target) {
-    const ViewEquations part = linearise_view(closures, view, smoothing);
-    if (n == 1) {
-      sum.matrix += part.matrix;
-      sum.gradient += part.gradient;
-      continue;
-    }
-    const auto support = ViewSplines::at(view.wo.z(), n);
-    const Eigen::Vector4d share = support.share;
-    const Eigen::Matrix4d both = share * share.transpose();
-    for (int q = 0; q < curves; ++q) {
-      const int column = q * n + support.first;
-      sum.gradient.segment<4>(column) += part.gradient[q] * share;
-      for (int p = q; p < curves; ++p) {
-        if (part.matrix(p, q) == 0) continue;
-        sum.matrix.block<4, 4>(p * n + support.first, column) += part.matrix(p, q) * both;
+// Adds a view's equations to the coefficients of its splines.
+void add_view(const ViewEquations& part, const ViewSplines::Support& support,
+              Equations& equations) {
+  const Eigen::Index curves = part.gradient.size();
+  for (Eigen::Index b = 0; b < support.share.size(); ++b) {
+    const Eigen::Index column = (support.first + b) * curves;
+    equations.gradient.segment(column, curves) += support.share[b] * part.gradient;
+    for (Eigen::Index a = b; a < support.share.size(); ++a) {
+      const Eigen::Index row = (support.first + a) * curves;
+      const double share = support.share[a] * support.share[b];
+      for (Eigen::Index q = 0; q < curves; ++q) {
+        for (Eigen::Index p = a == b ? q : 0; p < curves; ++p) {
+          equations.matrix(row + p, column + q) += share * part.matrix(p, q);
+        }
       }
     }
   }
+}
+
+Equations linearise(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {
+  const Eigen::Index curves = closures.x.rows();
+  const int n = closures.coefficients();
+  Equations sum{BandMatrix(closures.x.size(), std::min(n, 4) * curves - 1),
+                Eigen::VectorXd::Zero(closures.x.size())};
+  for (const SearchView& view : target) {
+    add_view(linearise_view(closures, view, smoothing), ViewSplines::at(view.wo.z(), n), sum);
+  }
   add_penalty(closures, sum);
+  return sum;
+}
+
+struct Bounds {
+  Eigen::VectorXd least, greatest;  // of each curve's coefficients
+};
+
+Bounds bounds_of(const ClosureLayout& layout) {
+  Bounds bounds{Eigen::VectorXd::Zero(layout.curves()),
+                Eigen::VectorXd::Constant(layout.curves(), 1e6)};
+  for (int k = 0; k < layout.specular; ++k) {
+    bounds.least.segment<3>(layout.shape(k, mean)) << least_log_alpha, -3, -3;
+    bounds.greatest.segment<3>(layout.shape(k, mean)) << 0, 3, 3;
+  }
+  return bounds;
 }
 
 // A damped step within the bounds. An unknown at its bound stays there while the error falls
 // outward.
-Eigen::VectorXd step_from(const Eigen::VectorXd& x, const Bounds& bounds,
+Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
                           const Equations& equations, double damping) {
-  std::vector<int> free;
-  for (int i = 0; i < x.size(); ++i) {
-    const bool held =
-        equations.gradient[i] > 0 ? x[i] <= bounds.least[i] : x[i] >= bounds.greatest[i];
+  const Eigen::Index curves = x.rows();
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double at = x.data()[i];
+    const bool held = equations.gradient[i] > 0 ? at <= bounds.least[i % curves]
+                                                : at >= bounds.greatest[i % curves];
     if (!held && equations.matrix(i, i) > 0) free.push_back(i);
   }
   const auto count = static_cast<Eigen::Index>(free.size());
-  const Eigen::VectorXd scale = equations.matrix.diagonal()(free).cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd matrix(count, count);
+  Eigen::VectorXd scale(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index at = free[static_cast<std::size_t>(i)];
+    scale[i] = 1 / std::sqrt(equations.matrix(at, at));
+  }
+  const Eigen::Index band = equations.matrix.band();
+  BandMatrix matrix(count, band);
   for (Eigen::Index j = 0; j < count; ++j) {
-    const double* const column = &equations.matrix(0, free[static_cast<std::size_t>(j)]);
+    const Eigen::Index column = free[static_cast<std::size_t>(j)];
     for (Eigen::Index i = j; i < count; ++i) {
-      matrix(i, j) = scale[i] * scale[j] * column[free[static_cast<std::size_t>(i)]];
+      const Eigen::Index row = free[static_cast<std::size_t>(i)];
+      if (row - column > band) break;
+      matrix(i, j) = scale[i] * scale[j] * equations.matrix(row, column);
     }
     matrix(j, j) += damping;
   }
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factors(matrix);  // in place
-  Eigen::VectorXd tried = x;
-  tried(free) -=
-      scale.cwiseProduct(factors.solve(scale.cwiseProduct(equations.gradient(free)).eval()).eval());
-  return tried.cwiseMax(bounds.least).cwiseMin(bounds.greatest);
+  const Eigen::VectorXd step = scale.cwiseProduct(
+      matrix.solve_in_place(scale.cwiseProduct(equations.gradient(free).eval())));
+  Eigen::MatrixXd tried = x;
+  tried.reshaped()(free) -= step;
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    tried.col(i) = tried.col(i).cwiseMax(bounds.least).cwiseMin(bounds.greatest);
+  }
+  return tried;
 }
 
 }  // namespace
 
+SearchView::SearchView(const TargetView& view) : wo(view.wo) {
+  constexpr std::size_t at_once = closure_kernel_lanes;
+  const std::size_t count = (view.lights.size() + at_once - 1) / at_once * at_once;
+  lights.resize(static_cast<Eigen::Index>(count), columns);
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool padding = i >= view.lights.size();
+    const TargetLight& light = view.lights[padding ? 0 : i];
+    lights.row(static_cast<Eigen::Index>(i)) << light.wi.transpose().array(),
+        light.half.transpose().array(), light.reflected.transpose(), padding ? 0 : light.weight,
+        light.typical;
+  }
+}
+
+SearchTarget in_columns(const Target& target) { return {target.begin(), target.end()}; }
+
 ClosureCurves subdivided(const ClosureCurves& closures) {
   ClosureCurves finer = closures;
-  const int from = closures.layout.coefficients;
-  const int to = finer.layout.coefficients = 2 * from - 3;
-  finer.x.resize(finer.layout.unknowns());
-  for (int curve = 0; curve < finer.layout.curves(); ++curve) {
-    finer.x.segment(curve * to, to) =
-        ViewSplines::subdivided(closures.x.segment(curve * from, from));
+  finer.x.resize(closures.x.rows(), 2 * closures.coefficients() - 3);
+  for (Eigen::Index curve = 0; curve < closures.x.rows(); ++curve) {
+    finer.x.row(curve) = ViewSplines::subdivided(closures.x.row(curve).transpose()).transpose();
   }
   return finer;
 }
 
 ClosureCurves constant_at(const ClosureCurves& closures, double cosine) {
-  return {{closures.layout.specular, 1}, closures.distributions, at_view(closures, cosine).curves};
+  return {closures.layout, closures.distributions, at_view(closures, cosine).curves};
 }
 
 Shape shape_at(const ClosureCurves& closures, int closure, double cosine) {
   return clipped_shape(at_view(closures, cosine), closures.layout, closure, cosine).shape;
 }
 
-Eigen::VectorXd light_of_closures(const TargetView& view, const ClosureCurves& closures) {
+Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures) {
   const ClosureLayout& layout = closures.layout;
   const AtView at = at_view(closures, view.wo.z());
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(layout.specular);
   for (int k = 0; k < layout.specular; ++k) {
     const Shape shape = clipped_shape(at, layout, k, view.wo.z()).shape;
     const Microfacet closure = microfacet(closures, k, shape, view.wo);
-    for (const TargetLight& light : view.lights) {
-      sum[k] += light.weight * closure.evaluate(light.wi, light.half);
+    for (Eigen::Index i = 0; i < view.lights.rows(); ++i) {
+      const auto light = view.lights.row(i).matrix();
+      sum[k] += light[SearchView::weight] *
+                closure.evaluate(light.segment<3>(SearchView::wi_x).transpose(),
+                                 light.segment<3>(SearchView::half_x).transpose());
     }
     sum[k] *= at.curves.segment<3>(layout.weight(k, 0)).sum();
   }
   return sum;
 }
 
-double smooth_error(const Target& target, const ClosureCurves& closures, double smoothing) {
+double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {
   double sum = 0;
-  for (const TargetView& view : target) sum += view_error(closures, view, smoothing);
+  for (const SearchView& view : target) sum += view_error(closures, view, smoothing);
   return sum + stiffness_penalty(closures);
 }
 
-ClosureCurves descend(const Target& target, ClosureCurves closures, double smoothing,
+ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double smoothing,
                       int iterations, const Monitor& monitor) {
   const Bounds bounds = bounds_of(closures.layout);
   double error = smooth_error(target, closures, smoothing), damping = 1e-3;
   ClosureCurves tried = closures;
-  Equations equations;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     monitor.throw_if_cancelled();
-    linearise(target, closures, smoothing, equations);
+    const Equations equations = linearise(target, closures, smoothing);
     const double before = error;
     for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
       tried.x = step_from(closures.x, bounds, equations, damping);

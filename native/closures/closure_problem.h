@@ -11,9 +11,35 @@
 
 namespace lobefit {
 
-// Where the unknowns are: coefficients of ViewSplines, curve after curve. Each specular closure has
-// three shape curves, then every closure, the diffuse one last, has a weight curve for each
-// channel.
+// A view of a target as the search reads it: its lights in columns, padded by lights of no weight
+// to a multiple of what the kernel takes at once.
+struct SearchView {
+  enum Column {
+    wi_x,
+    wi_y,
+    wi_z,
+    half_x,
+    half_y,
+    half_z,
+    red,
+    green,
+    blue,
+    weight,
+    typical,
+    columns
+  };
+
+  explicit SearchView(const TargetView& view);
+
+  Vector3 wo;
+  Eigen::Array<double, Eigen::Dynamic, columns> lights;
+};
+
+using SearchTarget = std::vector<SearchView>;
+SearchTarget in_columns(const Target& target);
+
+// Which curve is what. Each specular closure has three shape curves, then every closure, the
+// diffuse one last, has a weight curve for each channel.
 //   mean   m, (ln alpha_x + ln alpha_y) / 2
 //   spread h, (ln alpha_y - ln alpha_x) / 2 = h sin^2 theta
 //   bend   g, tan(tilt) = g sin theta
@@ -22,27 +48,24 @@ struct ClosureLayout {
   enum ShapeCurve { mean, spread, bend, shape_curves };
 
   int specular;
-  // Of each curve; with a single one all curves are constants.
-  int coefficients = ViewSplines::coarse;
   int closures() const { return specular + 1; }
   int shape(int closure, int curve) const { return closure * shape_curves + curve; }
   int weight(int closure, int channel) const {
     return specular * shape_curves + closure * 3 + channel;
   }
   int curves() const { return specular * shape_curves + closures() * 3; }
-  int unknowns() const { return curves() * coefficients; }
 };
 
 // Closures on the way to their best curves: the distribution of each specular one, and the
-// unknowns.
+// unknowns, the coefficients of ViewSplines: a row for each curve, a single column for constants.
 struct ClosureCurves {
   ClosureLayout layout;
   std::vector<Distribution> distributions;
-  Eigen::VectorXd x;
+  Eigen::MatrixXd x;
 
+  int coefficients() const { return static_cast<int>(x.cols()); }
   double at(int curve, double cosine) const {
-    return ViewSplines::evaluate(x.segment(curve * layout.coefficients, layout.coefficients),
-                                 cosine);
+    return ViewSplines::evaluate(x.row(curve).transpose(), cosine);
   }
 };
 
@@ -56,15 +79,15 @@ ClosureCurves constant_at(const ClosureCurves& closures, double cosine);
 Shape shape_at(const ClosureCurves& closures, int closure, double cosine);
 
 // What each specular closure adds to the light of a view, in units of the error.
-Eigen::VectorXd light_of_closures(const TargetView& view, const ClosureCurves& closures);
+Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures);
 
 // The error, |r| rounded off below `smoothing` times what is typical there, plus a little for
 // curvature.
-double smooth_error(const Target& target, const ClosureCurves& closures, double smoothing);
+double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing);
 
 // Levenberg and Marquardt's method on smooth_error, within the bounds of what Cycles can show; ends
 // early where nothing is gained. Throws Cancelled.
-ClosureCurves descend(const Target& target, ClosureCurves closures, double smoothing,
+ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double smoothing,
                       int iterations, const Monitor& monitor);
 
 }  // namespace lobefit

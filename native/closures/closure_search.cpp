@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "closures/view_paths.h"
 #include "measurement/parallel.h"
@@ -23,8 +24,8 @@ constexpr double start_weight = 0.1;
 // Closures with the same curves at all view angles.
 ClosureCurves constant_start(const Distributions& distributions, const std::vector<double>& alphas,
                              int bent, double bend_of_it) {
-  const ClosureLayout layout{static_cast<int>(distributions.size()), 1};
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(layout.unknowns());
+  const ClosureLayout layout{static_cast<int>(distributions.size())};
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(layout.curves());
   for (int k = 0; k < layout.specular; ++k) {
     x[layout.shape(k, mean)] = std::log(alphas[static_cast<std::size_t>(k)]);
     x[layout.shape(k, bend)] = k == bent ? bend_of_it : 0;
@@ -74,28 +75,26 @@ std::vector<ClosureCurves> constant_starts(int specular) {
 }
 
 ClosureCurves with_splines(const ClosureCurves& constant) {
-  ClosureCurves closures{{constant.layout.specular}, constant.distributions, {}};
-  closures.x = constant.x.transpose().replicate(closures.layout.coefficients, 1).reshaped();
-  return closures;
+  return {constant.layout, constant.distributions, constant.x.replicate(1, ViewSplines::coarse)};
 }
 
 // The closures with one more, of any width and all but black: so they can only become better.
 std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
   const ClosureLayout& from = closures.layout;
-  const ClosureLayout to{from.specular + 1, from.coefficients};
-  const int n = from.coefficients;
+  const ClosureLayout to{from.specular + 1};
   std::vector<ClosureCurves> all;
   for (const double alpha : start_alphas) {
     for (const auto distribution : {ggx, beckmann}) {
-      ClosureCurves more{to, closures.distributions, Eigen::VectorXd::Zero(to.unknowns())};
+      ClosureCurves more{to, closures.distributions,
+                         Eigen::MatrixXd::Zero(to.curves(), closures.coefficients())};
       more.distributions.push_back(distribution);
       const auto copy = [&](int to_curve, int from_curve, int curves) {
-        more.x.segment(to_curve * n, curves * n) = closures.x.segment(from_curve * n, curves * n);
+        more.x.middleRows(to_curve, curves) = closures.x.middleRows(from_curve, curves);
       };
       copy(0, 0, from.specular * shape_curves);
-      more.x.segment(to.shape(from.specular, mean) * n, n).setConstant(std::log(alpha));
+      more.x.row(to.shape(from.specular, mean)).setConstant(std::log(alpha));
       for (int k = 0; k < from.specular; ++k) copy(to.weight(k, 0), from.weight(k, 0), 3);
-      more.x.segment(to.weight(from.specular, 0) * n, 3 * n).setConstant(1e-3);
+      more.x.middleRows(to.weight(from.specular, 0), 3).setConstant(1e-3);
       copy(to.weight(to.specular, 0), from.weight(from.specular, 0), 3);
       all.push_back(std::move(more));
     }
@@ -106,9 +105,9 @@ std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
 class Search {
  public:
   Search(const Target& target, int threads, Monitor& monitor)
-      : full_(target),
-        medium_(thinned(target, 2, 2)),
-        small_(thinned(target, 3, 5)),
+      : full_(in_columns(target)),
+        medium_(in_columns(thinned(target, 6, 2))),
+        small_{in_columns(thinned(target, 9, 5, 0)), in_columns(thinned(target, 9, 5, 1))},
         threads_(threads),
         monitor_(monitor) {}
 
@@ -119,41 +118,56 @@ class Search {
       starts = extended(found_.front().closures);
     }
     const double begun = starts.empty() ? 0 : 0.25;
-    const ViewPaths paths = look_for(specular, std::move(starts), begun, 0.5);
+    const std::vector<ViewPaths> paths = look_for(specular, std::move(starts), begun, 0.5);
     monitor_.report("Fitting closures", 0.5);
     follow(full_, 0.03, 20);
     keep(2);
     for (int round = 0; round < 2 && take_detour(paths); ++round) continue;
     monitor_.report("Fitting closures", 0.8);
-    for (FoundCurves& found : found_) found.closures = subdivided(found.closures);
+    for (FoundCurves& found : found_) found.closures = subdivided(subdivided(found.closures));
     for (const double smoothing : {0.01, 0.002}) follow(full_, smoothing, 30);
     return found_.front();
   }
 
  private:
-  // Leaves promising closures in found_, with curves of few splines, some after these starts.
-  ViewPaths look_for(int specular, std::vector<ClosureCurves> starts, double progress,
-                     double progress_end) {
-    monitor_.report("Trying closures", progress);
+  // Leaves promising closures in found_, with curves of few splines, some after these starts. Which
+  // of many near-equal ones are found depends on the choice of samples, so there are two.
+  std::vector<ViewPaths> look_for(int specular, std::vector<ClosureCurves> starts, double progress,
+                                  double progress_end) {
     const std::vector<ClosureCurves> constant = constant_starts(specular);
-    ViewPaths paths(small_, constant, threads_, monitor_);
-    monitor_.report("Trying closures", (progress + progress_end) / 2);
     if (starts.empty()) {
       for (const ClosureCurves& start : constant) starts.push_back(with_splines(start));
     }
-    start_from(starts);
-    follow(small_, 0.3, 5);
-    keep(12);
-    for (ClosureCurves& path : paths.paths()) found_.push_back({std::move(path), 0});
-    follow(medium_, 0.1, 10);
+    std::vector<FoundCurves> promising;
+    std::vector<ViewPaths> paths;
+    for (const SearchTarget& small : small_) {
+      const double share = static_cast<double>(paths.size()) / static_cast<double>(small_.size());
+      monitor_.report("Trying closures", progress + share * (progress_end - progress));
+      paths.emplace_back(small, constant, threads_, monitor_);
+      start_from(starts);
+      follow(small, 0.3, 5);
+      keep(12);
+      for (ClosureCurves& path : paths.back().paths()) found_.push_back({std::move(path), 0});
+      follow(medium_, 0.1, 10);
+      keep(5);
+      std::move(found_.begin(), found_.end(), std::back_inserter(promising));
+    }
+    found_ = std::move(promising);
+    sort();
     keep(5);
     return paths;
   }
 
   // Whether a way past the best closures leads to better ones; then those are the first.
-  bool take_detour(const ViewPaths& paths) {
+  bool take_detour(const std::vector<ViewPaths>& paths) {
     const FoundCurves best = found_.front();
-    start_from(paths.detours(best.closures, monitor_));
+    std::vector<ClosureCurves> detours;
+    for (const ViewPaths& known : paths) {
+      for (ClosureCurves& detour : known.detours(best.closures, monitor_)) {
+        detours.push_back(std::move(detour));
+      }
+    }
+    start_from(detours);
     follow(medium_, 0.1, 10);
     keep(2);
     follow(full_, 0.03, 20);
@@ -169,20 +183,24 @@ class Search {
   }
 
   // Goes on with all that was found, and sorts it by its error.
-  void follow(const Target& target, double smoothing, int iterations) {
+  void follow(const SearchTarget& target, double smoothing, int iterations) {
     parallel_for(static_cast<int>(found_.size()), threads_, [&](int i) {
       FoundCurves& found = found_[static_cast<std::size_t>(i)];
       found.closures = descend(target, std::move(found.closures), smoothing, iterations, monitor_);
       found.error = smooth_error(target, found.closures, 1e-3);
     });
+    sort();
+  }
+
+  void sort() {
     std::stable_sort(found_.begin(), found_.end(),
                      [](const FoundCurves& a, const FoundCurves& b) { return a.error < b.error; });
   }
 
   void keep(std::size_t most) { found_.resize(std::min(found_.size(), most), found_.front()); }
 
-  const Target& full_;
-  const Target medium_, small_;
+  const SearchTarget full_, medium_;
+  const std::vector<SearchTarget> small_;
   const int threads_;
   Monitor& monitor_;
   std::vector<FoundCurves> found_;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "closures/closure_kernel.h"
 #include "closures/microfacet.h"
 #include "closures/view_curve.h"
 #include "reflectance/reflectance.h"
@@ -20,8 +21,6 @@ struct SpecularClosure {
   ViewCurve roughness, anisotropy, bend;
   RgbCurve weight;
 };
-
-inline constexpr int most_specular_closures = 3;
 
 // The sum of a diffuse closure and some specular ones, each times its weight.
 struct ClosureSet {

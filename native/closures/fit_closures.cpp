@@ -29,8 +29,7 @@ ClosureSet to_closures(const ClosureCurves& curves, double tolerance,
   const ClosureLayout& layout = curves.layout;
   const auto weight_of = [&](int closure, int channel) {
     const int curve = layout.weight(closure, channel);
-    const double size =
-        curves.x.segment(curve * layout.coefficients, layout.coefficients).maxCoeff();
+    const double size = curves.x.row(curve).maxCoeff();
     const ViewCurve& factor = factors.by_channel[static_cast<std::size_t>(channel)];
     return ViewCurve::following(
         [&](double cosine) { return factor(cosine) * curves.at(curve, cosine); }, tolerance * size);

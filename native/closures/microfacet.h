@@ -4,11 +4,10 @@
 
 #include <string_view>
 
+#include "closures/microfacet_terms.h"
 #include "measurement/vector3.h"
 
 namespace lobefit {
-
-enum class Distribution { ggx, beckmann };
 
 // "ggx", "beckmann".
 std::string_view name_of(Distribution distribution);
@@ -24,14 +23,6 @@ struct Shape {
   double tilt = 0;
 };
 
-// f cos(theta_i) in 1/sr, and the derivatives of its logarithm.
-struct ShapeValue {
-  double value = 0;
-  double by_log_alpha_x = 0;
-  double by_log_alpha_y = 0;
-  double by_tilt = 0;
-};
-
 // A closure seen under one view angle from the normal n = +z, the viewer in the xz plane at x > 0.
 //
 //   f cos = D(h) G(wi, wo) / (4 n'.wo),  G = 1 / (1 + Lambda(wi) + Lambda(wo)),
@@ -44,31 +35,12 @@ class Microfacet {
 
   // For a light at wi and the half vector of wi and wo, both of unit length.
   double evaluate(const Vector3& wi, const Vector3& half) const;
-  ShapeValue evaluate_with_derivatives(const Vector3& wi, const Vector3& half) const;
+  ClosureValue<double> evaluate_with_derivatives(const Vector3& wi, const Vector3& half) const;
+
+  const MicrofacetTerms& terms() const { return terms_; }
 
  private:
-  // Smith's slopes (alpha tan theta)^2 of a direction, and its derivatives.
-  struct Slope {
-    double value, by_log_alpha_x, by_log_alpha_y, by_tilt;
-  };
-  // What masking adds for one direction, and its derivative by the slope.
-  struct Masking {
-    double value, by_slope;
-  };
-  Slope slope(const Vector3& w) const;
-  Masking masking(double slope) const;
-  template <bool derivatives>
-  ShapeValue compute(const Vector3& wi, const Vector3& half) const;
-
-  Distribution distribution_;
-  double tilt_;
-  double stretch2_;  // 1 + tilt^2
-  double alpha_x2_, alpha_y2_;
-  double inverse_x2_, inverse_y2_;
-  double scale_;  // all factors that do not depend on the light
-  double scale_by_tilt_;
-  Slope slope_o_{};
-  Masking masking_o_{};
+  MicrofacetTerms terms_{};
 };
 
 }  // namespace lobefit

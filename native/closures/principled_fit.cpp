@@ -318,8 +318,8 @@ struct Candidate {
 
 Principled fit_principled(const Target& target, int threads) {
   if (target.empty()) return {};
-  const Views few = thin_out(target, 4, 3), some = thin_out(target, 4, 1),
-              all = thin_out(target, 1, 1, thread_count(threads));
+  const Views few = thin_out(target, 12, 2), some = thin_out(target, 12, 1),
+              all = thin_out(target, 2, 1, thread_count(threads));
   std::vector<Candidate> found;
   for (const Vector& start : starts(few)) found.push_back({start, 0});
   // Follows every candidate and keeps the best few.

@@ -39,8 +39,9 @@ using Target = std::vector<TargetView>;
 Target sample_target(const Reflectance& f);
 
 // The same with every so many-th view and light alone, which stand for the others; at least one of
-// each.
-Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride);
+// each. Another choice of them has other views and lights.
+Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride,
+               std::size_t choice = 0);
 
 // sum weight |approximation - reflected|, for f cos of an approximation in the same frame.
 double error_of(const Target& target, const Reflectance& f_times_cosine);

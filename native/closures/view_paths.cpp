@@ -20,14 +20,14 @@ constexpr int iterations = 12;
 constexpr int most_optima = 6;
 constexpr double alike = 0.02;
 
-double root_of(const Target& view) { return std::sqrt(view.front().wo.z()); }
+double root_of(const SearchTarget& view) { return std::sqrt(view.front().wo.z()); }
 
 }  // namespace
 
-ViewPaths::ViewPaths(const Target& views, const std::vector<ClosureCurves>& starts, int threads,
-                     const Monitor& monitor)
+ViewPaths::ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>& starts,
+                     int threads, const Monitor& monitor)
     : threads_(threads) {
-  for (const TargetView& view : views) views_.push_back({view});
+  for (const SearchView& view : views) views_.push_back({view});
   std::vector<Optima> found(starts.size(), Optima(views_.size()));
   parallel_for(static_cast<int>(starts.size() * views_.size()), threads, [&](int job) {
     const std::size_t start = static_cast<std::size_t>(job) / views_.size();
@@ -72,7 +72,7 @@ std::vector<ClosureCurves> ViewPaths::detours(const ClosureCurves& closures,
 
 ViewPaths::Optimum ViewPaths::optimum(std::size_t view, const ClosureCurves& start,
                                       const Monitor& monitor) const {
-  const Target& target = views_[view];
+  const SearchTarget& target = views_[view];
   const ClosureCurves closures = descend(target, start, smoothing, iterations, monitor);
   Optimum result{closures,
                  smooth_error(target, closures, 1e-3),
@@ -132,7 +132,7 @@ ViewPaths::Optima ViewPaths::in_every_order(const Optimum& optimum) {
     for (std::size_t k = 0; k < order.size(); ++k) {
       const int to = static_cast<int>(k), from = static_cast<int>(order[k]);
       const auto move = [&](int to_curve, int from_curve) {
-        ordered.closures.x.segment<3>(to_curve) = optimum.closures.x.segment<3>(from_curve);
+        ordered.closures.x.middleRows<3>(to_curve) = optimum.closures.x.middleRows<3>(from_curve);
       };
       move(layout.shape(to, 0), layout.shape(from, 0));
       move(layout.weight(to, 0), layout.weight(from, 0));
@@ -185,23 +185,19 @@ ViewPaths::Path ViewPaths::way(const OptimaByView& optima, double reluctance) co
 }
 
 ClosureCurves ViewPaths::through(const Path& path) const {
-  ClosureCurves closures{
-      {path.front()->closures.layout.specular}, path.front()->closures.distributions, {}};
-  const ClosureLayout& layout = closures.layout;
-  closures.x.resize(layout.unknowns());
-  for (int i = 0; i < layout.coefficients; ++i) {
+  constexpr int coefficients = ViewSplines::coarse;
+  const ClosureCurves& first = path.front()->closures;
+  ClosureCurves closures{first.layout, first.distributions,
+                         Eigen::MatrixXd(first.x.rows(), coefficients)};
+  for (int i = 0; i < coefficients; ++i) {
     // Views ascend. Between two of them values go straight from one to the other.
-    const double root = ViewSplines::centre(i, layout.coefficients);
+    const double root = ViewSplines::centre(i, coefficients);
     std::size_t next = 0;
     while (next + 1 < path.size() && root_of(views_[next]) < root) ++next;
     const std::size_t last = next == 0 ? 0 : next - 1;
     const double gap = root_of(views_[next]) - root_of(views_[last]);
     const double share = gap > 0 ? std::clamp((root - root_of(views_[last])) / gap, 0.0, 1.0) : 0.0;
-    const Eigen::VectorXd values =
-        (1 - share) * path[last]->closures.x + share * path[next]->closures.x;
-    for (int curve = 0; curve < layout.curves(); ++curve) {
-      closures.x[curve * layout.coefficients + i] = values[curve];
-    }
+    closures.x.col(i) = (1 - share) * path[last]->closures.x + share * path[next]->closures.x;
   }
   return closures;
 }

@@ -16,7 +16,7 @@ class ViewPaths {
  public:
   // Fits closures, all of one number, to each view by itself from each of the starts, which have
   // constant curves. Throws Cancelled.
-  ViewPaths(const Target& views, const std::vector<ClosureCurves>& starts, int threads,
+  ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>& starts, int threads,
             const Monitor& monitor);
 
   // The best ways, for each choice of distributions and each reluctance to jump.
@@ -45,7 +45,7 @@ class ViewPaths {
   static Optima in_every_order(const Optimum& optimum);
   static double jump(const Optimum& from, const Optimum& to);
 
-  std::vector<Target> views_;  // each of one view
+  std::vector<SearchTarget> views_;  // each of one view
   std::map<std::vector<Distribution>, OptimaByView> by_distributions_;
   int threads_;
 };

@@ -44,8 +44,6 @@ inline constexpr double log_offset = 0.01;
 
 enum class KernelNorm { smoothed_l1, l2, log_l2 };
 
-// Fastest version that this processor can run; both give the same to rounding.
-bool has_avx2();
 KernelSums run_kernel(const KernelInput& input, KernelNorm norm);
 
 // base^s of `count` lobe coordinates, a multiple of 4; 0 where the base is not positive.
@@ -56,14 +54,5 @@ struct PowerInput {
   double exponent, interpolation;
 };
 void run_powers(const PowerInput& input, double* powers);
-
-// For tests: while one of these exists every thread runs the version for any x86-64.
-class BaselineKernel {
- public:
-  BaselineKernel();
-  ~BaselineKernel();
-  BaselineKernel(const BaselineKernel&) = delete;
-  BaselineKernel& operator=(const BaselineKernel&) = delete;
-};
 
 }  // namespace lobefit

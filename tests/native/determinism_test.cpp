@@ -6,8 +6,8 @@
 #include <string>
 
 #include "fitting/fit.h"
-#include "fitting/kernel.h"
 #include "fitting/objective.h"
+#include "measurement/instructions.h"
 #include "reflectance/abc.h"
 #include "tables.h"
 
@@ -107,7 +107,7 @@ TEST_F(KernelVersions, AgreeOnAPass) {
       return Evaluation(Objective(samples, variables, norm, 0.1, 2).evaluate(x, Curvature::newton));
     };
     const Evaluation fast = pass();
-    const BaselineKernel baseline;
+    const BaselineInstructions baseline;
     const Evaluation slow = pass();
     // Fused multiply-adds round once instead of twice; 10^6 roundings of one sign would make 1e-10,
     // as they come they make far less.
@@ -126,7 +126,7 @@ TEST_F(KernelVersions, AgreeOnAPass) {
 TEST_F(KernelVersions, AgreeOnAWholeFit) {
   for (const Measurement* measurement : {&sample(), &damaged_sample()}) {
     const Fit fast = fit_of(*measurement, {});
-    const BaselineKernel baseline;
+    const BaselineInstructions baseline;
     const Fit slow = fit_of(*measurement, {});
     EXPECT_NEAR(fast.errors.relative_l1.pooled, slow.errors.relative_l1.pooled, 1e-6);
     // At a minimum an error of 1e-6 leaves the parameters free by a few times its root.

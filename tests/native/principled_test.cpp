@@ -215,7 +215,7 @@ TEST(FitPrincipled, GivesLegalSocketsForAnyTarget) {
 TEST(FitPrincipled, GivesLegalSocketsForAFewLights) {
   // Too few to start on a part of them.
   const Target whole = strange_targets().front();
-  const Target one_view(1, whole[20]);
+  const Target one_view(1, whole[60]);
   expect_legal(fit_principled(one_view));
   Target one_light = one_view;
   one_light[0].lights.resize(1);

@@ -1,0 +1,28 @@
+// Symmetric positive definite matrices that vanish away from the diagonal.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace lobefit {
+
+// The lower half of a symmetric matrix whose elements (i, j) are 0 for i - j > band.
+class BandMatrix {
+ public:
+  BandMatrix() = default;
+  BandMatrix(Eigen::Index size, Eigen::Index band);
+
+  Eigen::Index size() const { return columns_.cols(); }
+  Eigen::Index band() const { return columns_.rows() - 1; }
+  // j <= i <= j + band.
+  double operator()(Eigen::Index i, Eigen::Index j) const { return columns_(i - j, j); }
+  double& operator()(Eigen::Index i, Eigen::Index j) { return columns_(i - j, j); }
+
+  // The x of matrix x = b, by Cholesky's method in place: the matrix holds its factor afterwards.
+  // Pivots that rounding leaves below a tiny part of a unit diagonal count as that.
+  Eigen::VectorXd solve_in_place(Eigen::VectorXd b);
+
+ private:
+  Eigen::MatrixXd columns_;  // element (i, j) in row i - j
+};
+
+}  // namespace lobefit

@@ -1,0 +1,12 @@
+// The kernel as closure_kernel_avx2.cpp compiles it; for closure_kernel_baseline.cpp, which
+// chooses.
+#pragma once
+
+#include "closures/closure_kernel.h"
+
+namespace lobefit {
+
+ClosureKernelSums run_closure_kernel_avx2(const ClosureKernelInput& input);
+double run_closure_error_avx2(const ClosureKernelInput& input);
+
+}  // namespace lobefit
