@@ -168,9 +168,9 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
 constexpr double stiffness = 1e-5;
 
 // Splines of half the width have twice as many second differences for the same curve, each a
-// quarter as large: they count eight times as much, that its cost stays the same.
+// quarter as large. They count twice as much, that curves may bend more once most is known of them.
 double stiffness_of(int coefficients) {
-  return stiffness * std::pow((coefficients - 3.0) / (ViewSplines::coarse - 3.0), 3);
+  return stiffness * (coefficients - 3.0) / (ViewSplines::coarse - 3.0);
 }
 
 Eigen::MatrixXd second_differences(const Eigen::MatrixXd& x) {
