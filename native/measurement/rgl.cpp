@@ -25,7 +25,7 @@ constexpr double rounding = 1e-6;
 constexpr std::size_t isotropic_azimuths = 2;
 
 double elevation(const Vector3& direction) {
-  return std::atan2(std::hypot(direction.x(), direction.y()), direction.z());
+  return std::atan2(direction.head<2>().norm(), direction.z());
 }
 
 double azimuth(const Vector3& direction) { return std::atan2(direction.y(), direction.x()); }
@@ -216,26 +216,33 @@ Rgb Rgl::evaluate(const Azimuth& light, const Mixture& elevations, const Angles&
          (of_normal.interpolate(normals_.grid(0)) / (4 * of_light.interpolate(area_.grid(0))));
 }
 
-Rgb Rgl::evaluate(const Vector3& wi, const Vector3& wo) const {
+Rgb Rgl::evaluate(const Vector3& wi, const Half& half) const {
   const double theta_i = elevation(wi);
-  if (!(wi.z() > 0 && wo.z() > 0 && theta_i >= theta_i_.front() - rounding &&
-        theta_i <= theta_i_.back() + rounding)) {
-    return unknown;
-  }
-  const Vector3 half = wi + wo;
-  const Angles angles{coordinate_of_elevation(theta_i), coordinate_of_elevation(elevation(half)),
-                      azimuth(half) - azimuth(wi)};
+  if (theta_i < theta_i_.front() - rounding || theta_i > theta_i_.back() + rounding) return unknown;
+  const Angles angles{coordinate_of_elevation(theta_i), half.x, half.phi - azimuth(wi)};
   const Mixture elevations = elevations_around(theta_i);
   Rgb mean = Rgb::Zero();
   for (const Azimuth& light : azimuths_) mean += light.weight * evaluate(light, elevations, angles);
   return mean;
 }
 
+Rgl::Half Rgl::half_between(const Vector3& wi, const Vector3& wo) {
+  const Vector3 half = wi + wo;
+  return {coordinate_of_elevation(elevation(half)), azimuth(half)};
+}
+
+Rgb Rgl::evaluate(const Vector3& wi, const Vector3& wo) const {
+  if (!(wi.z() > 0 && wo.z() > 0)) return unknown;
+  return evaluate(wi, half_between(wi, wo));
+}
+
 Rgb Rgl::reflectance(const Vector3& wi, const Vector3& wo) const {
+  if (!(wi.z() > 0 && wo.z() > 0)) return unknown;
+  const Half half = half_between(wi, wo);
   Rgb total = Rgb::Zero();
   double cosines = 0;
   for (const auto& [light, viewer] : {std::pair{wi, wo}, std::pair{wo, wi}}) {
-    const Rgb value = evaluate(light, viewer);
+    const Rgb value = evaluate(light, half);
     if (value.isNaN().any()) continue;
     total += value;
     cosines += viewer.z();

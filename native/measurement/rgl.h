@@ -61,6 +61,10 @@ class Rgl {
     std::size_t first;
     double light, origin, sign, weight;
   };
+  // A half vector: u(theta_m) and phi_m.
+  struct Half {
+    double x, phi;
+  };
   // Light and half vector: u(theta_i), u(theta_m) and phi_m - phi_i.
   struct Angles {
     double x_i, x_m, turn;
@@ -74,7 +78,9 @@ class Rgl {
   static DensityWarp read_visible_normals(const TensorFile& file, const TensorFile::Shape& tables);
   static Grids read_colours(const TensorFile& file, const TensorFile::Shape& tables);
 
+  static Half half_between(const Vector3& wi, const Vector3& wo);
   Mixture elevations_around(double theta_i) const;
+  Rgb evaluate(const Vector3& wi, const Half& half) const;
   Rgb evaluate(const Azimuth& azimuth, const Mixture& elevations, const Angles& angles) const;
 
   std::vector<float> theta_i_;

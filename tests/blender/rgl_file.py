@@ -49,6 +49,14 @@ def glossy_fields(phi_i=(0.0,), elevations: int = 16, size: int = 32) -> dict[st
     }
 
 
+def spectral_fields(wavelengths: np.ndarray, spectrum: np.ndarray) -> dict[str, np.ndarray]:
+    """A small glossy surface of which every direction has this spectrum; wavelengths in nm."""
+    fields = glossy_fields(elevations=3, size=8)
+    red = fields.pop("rgb")[:, :, :1]
+    spectra = red * spectrum.astype("f4")[:, None, None]
+    return fields | {"spectra": spectra, "wavelengths": wavelengths.astype("f4")}
+
+
 def random_fields(phi_i=(0.0,), elevations: int = 6, seed: int = 1) -> dict[str, np.ndarray]:
     """Tables that mean nothing, to hold two readers against each other."""
     rng = np.random.default_rng(seed)

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from lobefit import InputError, _native, fit, read
 from lobefit.command_line import main
-from rgl_file import directions, glossy_fields, random_fields, write_tensor_file
+from rgl_file import (
+    directions,
+    glossy_fields,
+    random_fields,
+    spectral_fields,
+    write_tensor_file,
+)
 
 SHARED = Path(__file__).parents[3] / "shared" / "measured"
 MEASURED = [
@@ -151,6 +157,41 @@ def test_random_tables_agree_with_mitsuba(tmp_path, phi_i):
     )
     wi, wo = directions(theta_i, 0 * turn), directions(theta_o, turn)
     assert_same(_native.Rgl(path).evaluate(wi, wo), expected, 1e-3)
+
+
+WAVELENGTHS = np.arange(360.0, 1001.0, 4.0)
+SPECTRA = {
+    "white": np.ones_like(WAVELENGTHS),
+    "red": 1 / (1 + np.exp((600 - WAVELENGTHS) / 15)),
+    "green": np.exp(-(((WAVELENGTHS - 540) / 40) ** 2)),
+    "blue": 1 / (1 + np.exp((WAVELENGTHS - 490) / 12)),
+    "ramp": 0.2 + 0.4 * (WAVELENGTHS - 400) / 600,
+}
+
+
+@pytest.mark.parametrize("name", SPECTRA)
+def test_spectra_have_the_colours_of_the_tables_of_the_cie(tmp_path, name):
+    mitsuba = pytest.importorskip("mitsuba", reason="mitsuba is absent")
+    mitsuba.set_variant("scalar_spectral")
+    daylight, interaction = mitsuba.load_dict({"type": "d65"}), mitsuba.SurfaceInteraction3f()
+    observed = []
+    for wavelength in map(float, WAVELENGTHS):
+        interaction.wavelengths = wavelength
+        power = np.array(daylight.eval(interaction)).ravel()[0]
+        observed.append(power * np.array(mitsuba.cie1931_xyz(wavelength)).ravel()[:3])
+    xyz_to_rgb = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
+    observed = np.array(observed)
+    expected = xyz_to_rgb @ (SPECTRA[name] @ observed) / observed[:, 1].sum()
+
+    wi, wo = directions(np.radians([20.0]), np.zeros(1)), directions(np.radians([30.0]), np.ones(1))
+    values = [
+        _native.Rgl(
+            write_tensor_file(tmp_path / "s.bsdf", spectral_fields(WAVELENGTHS, spectrum))
+        ).evaluate(wi, wo)[0]
+        for spectrum in (SPECTRA[name], SPECTRA["white"])
+    ]
+    # The colour matching functions are fits, off by up to 2 % of their largest value.
+    assert values[0] / values[1] == pytest.approx(expected, abs=0.007)
 
 
 @pytest.mark.parametrize("name", MEASURED)
