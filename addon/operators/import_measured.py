@@ -21,7 +21,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
     filename_ext = ".binary"
-    filter_glob: StringProperty(default="*.binary", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.binary;*.bsdf", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
@@ -68,7 +68,7 @@ class LOBEFIT_FH_measured(bpy.types.FileHandler):
     bl_idname = "LOBEFIT_FH_measured"
     bl_label = "Measured BRDF"
     bl_import_operator = LOBEFIT_OT_import_measured.bl_idname
-    bl_file_extensions = ".binary"
+    bl_file_extensions = ".binary;.bsdf"
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
@@ -78,5 +78,5 @@ class LOBEFIT_FH_measured(bpy.types.FileHandler):
 def draw_menu(self, context: bpy.types.Context) -> None:
     """The entry in File > Import."""
     self.layout.operator(
-        LOBEFIT_OT_import_measured.bl_idname, text="Measured BRDF (.binary)", icon="MATERIAL"
+        LOBEFIT_OT_import_measured.bl_idname, text="Measured BRDF (.binary, .bsdf)", icon="MATERIAL"
     )

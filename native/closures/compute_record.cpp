@@ -68,6 +68,8 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   contents.measurement = measurement;
   contents.read_seconds = seconds_since(start);
   contents.fit = fit_named(source, *measurement, options, monitor);
+  const std::vector<std::string>& warnings = measurement->source().warnings;
+  contents.fit.warnings.insert(contents.fit.warnings.begin(), warnings.begin(), warnings.end());
   monitor.report("Measuring the albedo", 0.97);
   contents.albedo = albedo_by_view_angle(*measurement, contents.fit.parameters, options.threads);
   monitor.throw_if_cancelled();

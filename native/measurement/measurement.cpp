@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "measurement/parallel.h"
 
@@ -78,8 +79,9 @@ Neighbours periodic_neighbours(double coordinate, int bins) {
 
 }  // namespace
 
-Measurement::Measurement(const FillRows& fill, int threads)
-    : planes_(std::make_unique_for_overwrite<double[]>(3 * static_cast<std::size_t>(bin_count))) {
+Measurement::Measurement(const FillRows& fill, int threads, TableSource source)
+    : planes_(std::make_unique_for_overwrite<double[]>(3 * static_cast<std::size_t>(bin_count))),
+      source_(std::move(source)) {
   std::array<BinCounts, theta_h_bins> counts;
   parallel_for(theta_h_bins, thread_count(threads), [&](int h) {
     double* const first = planes_.get() + index(h, 0, 0);

@@ -5,6 +5,8 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "measurement/half_difference.h"
 #include "measurement/vector3.h"
@@ -19,6 +21,12 @@ struct BinCounts {
   int below_horizon = 0;
   int negative = 0;
   int non_finite = 0;
+};
+
+// The format of the file that a table was read from, and what a user should know of how.
+struct TableSource {
+  std::string format = "MERL";
+  std::vector<std::string> warnings;
 };
 
 // Reflectance f in 1/sr at the centres of 90 x 90 x 180 bins (Matusik et al. 2003):
@@ -42,7 +50,7 @@ class Measurement {
 
   // Filled row by row on up to `threads` threads (0: every processor). All three channels of every
   // invalid bin become NaN.
-  explicit Measurement(const FillRows& fill, int threads = 0);
+  explicit Measurement(const FillRows& fill, int threads = 0, TableSource source = {});
   // From three planes (red, green, blue) of bin_count values in 1/sr, phi_d running fastest, then
   // theta_d.
   explicit Measurement(std::span<const double> planes);
@@ -63,6 +71,7 @@ class Measurement {
   Rgb evaluate(const Vector3& wi, const Vector3& wo) const;
 
   const BinCounts& bins() const { return bins_; }
+  const TableSource& source() const { return source_; }
 
   // Three planes of bin_count values, NaN where invalid.
   std::span<const double> planes() const {
@@ -72,6 +81,7 @@ class Measurement {
  private:
   std::unique_ptr<double[]> planes_;
   BinCounts bins_;
+  TableSource source_;
 };
 
 // Sines and cosines of the bins' centres, of which all that a bin's directions and lobes are made.

@@ -8,9 +8,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <limits>
-#include <memory>
-#include <mutex>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -29,26 +26,6 @@ constexpr Dimensions dimensions = {Measurement::theta_h_bins, Measurement::theta
                                    Measurement::phi_d_bins};
 constexpr int double_phi_bins = 2 * Measurement::phi_d_bins;
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, CloseFile>;
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& why) {
-  throw InputError(path.string() + ": " + why);
-}
-
-std::string reason() { return std::strerror(errno); }
-
-// "34992012" -> "34,992,012", as a person reads it.
-std::string with_commas(std::uintmax_t number) {
-  std::string digits = std::to_string(number);
-  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3) {
-    digits.insert(static_cast<std::size_t>(at), 1, ',');
-  }
-  return digits;
-}
-
 std::uintmax_t bytes_of(const Dimensions& size) {
   std::uintmax_t values = 3;
   for (const std::int32_t n : size) values *= static_cast<std::uintmax_t>(n);
@@ -64,15 +41,15 @@ std::int32_t byte_swapped(std::int32_t value) {
   return static_cast<std::int32_t>(__builtin_bswap32(static_cast<std::uint32_t>(value)));
 }
 
-void check_dimensions(const std::filesystem::path& path, const Dimensions& found) {
+void check_dimensions(const InputFile& file, const Dimensions& found) {
   if (has_merl_dimensions(found)) return;
   const std::string expected = "expected a MERL table of 90 x 90 x 180 bins, found ";
   Dimensions swapped = found;
   for (std::int32_t& n : swapped) n = byte_swapped(n);
   if (has_merl_dimensions(swapped)) {
-    fail(path, expected +
-                   "these dimensions in big-endian byte order; MERL files are "
-                   "little-endian, was it written on another kind of machine?");
+    file.fail(expected +
+              "these dimensions in big-endian byte order; MERL files are "
+              "little-endian, was it written on another kind of machine?");
   }
   std::string wrong;
   for (int axis = 0; axis < 3; ++axis) {
@@ -80,44 +57,24 @@ void check_dimensions(const std::filesystem::path& path, const Dimensions& found
     wrong += (wrong.empty() ? "" : ", ") + std::string(dimension_name[axis]) + " = " +
              std::to_string(found[axis]);
   }
-  fail(path, expected + wrong + "; is this another format?");
+  file.fail(expected + wrong + "; is this another format?");
 }
 
-File open_for_reading(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (status.type() == std::filesystem::file_type::not_found) {
-    fail(path, "expected a measured reflectance file, found no such file.");
-  }
-  if (std::filesystem::is_directory(status)) {
-    fail(path, "expected a measured reflectance file, found a folder.");
-  }
-  if (!error && !std::filesystem::is_regular_file(status)) {
-    fail(path, "expected a measured reflectance file, found something that is not a file.");
-  }
-  File file(std::fopen(path.c_str(), "rb"));
-  if (!file) fail(path, "expected a readable file, found: " + reason() + ".");
-  return file;
-}
-
-Dimensions read_dimensions(const std::filesystem::path& path, std::FILE* file,
-                           std::uintmax_t size) {
+Dimensions read_dimensions(const InputFile& file) {
   Dimensions found{};
-  if (size < sizeof(found)) {
-    fail(path, "expected a MERL table of " + with_commas(bytes_of(dimensions)) + " bytes, found " +
-                   (size == 0 ? "an empty file." : with_commas(size) + " bytes."));
+  if (file.size() < sizeof(found)) {
+    file.fail("expected a MERL table of " + with_commas(bytes_of(dimensions)) + " bytes, found " +
+              (file.size() == 0 ? "an empty file." : with_commas(file.size()) + " bytes."));
   }
-  if (std::fread(found.data(), sizeof(found), 1, file) != 1) {
-    fail(path, "expected three dimensions at its head, found: " + reason() + ".");
-  }
+  file.read(0, found.data(), sizeof(found));
   return found;
 }
 
-void check_size(const std::filesystem::path& path, std::uintmax_t expected, std::uintmax_t found) {
-  if (expected == found) return;
-  fail(path, "expected " + with_commas(expected) + " bytes, found " + with_commas(found) +
-                 (found < expected ? "; was the file cut off while it was copied?"
-                                   : "; there is something behind the table."));
+void check_size(const InputFile& file, std::uintmax_t expected) {
+  if (expected == file.size()) return;
+  file.fail("expected " + with_commas(expected) + " bytes, found " + with_commas(file.size()) +
+            (file.size() < expected ? "; was the file cut off while it was copied?"
+                                    : "; there is something behind the table."));
 }
 
 // The mean of two stored values, or the usable one of them.
@@ -130,15 +87,11 @@ double merged(double first, double second) {
 // Reads the rows of one theta_h after another from the three planes of a file.
 class RowReader {
  public:
-  RowReader(const std::filesystem::path& path, std::FILE* file, int phi_bins)
-      : path_(path), file_(file), phi_bins_(phi_bins) {
-    // Pieces are read whole: a buffer between would only copy them.
-    std::setvbuf(file, nullptr, _IONBF, 0);
-  }
+  RowReader(const InputFile& file, int phi_bins) : file_(file), phi_bins_(phi_bins) {}
 
-  // Threads take turns at the file. What they read goes through a piece of memory that is small and
-  // their own, so that they touch the rows' memory for the first time, which is slow, all at once.
-  void operator()(int h, const Measurement::Rows& rows) {
+  // What threads read goes through a piece of memory that is small and their own, so that they
+  // touch the rows' memory for the first time, which is slow, all at once.
+  void operator()(int h, const Measurement::Rows& rows) const {
     std::array<double, piece_theta_d * double_phi_bins> piece;
     for (int c = 0; c < 3; ++c) {
       for (int d = 0; d < Measurement::theta_d_bins; d += piece_theta_d) {
@@ -156,16 +109,10 @@ class RowReader {
   static_assert(Measurement::theta_d_bins % piece_theta_d == 0);
 
   // Reads `piece_theta_d` steps of theta_d from the first-th in the file on.
-  void read(int first, double* values) {
+  void read(int first, double* values) const {
     const auto before = static_cast<std::size_t>(phi_bins_) * static_cast<std::size_t>(first);
     const auto count = static_cast<std::size_t>(phi_bins_ * piece_theta_d);
-    const auto offset = static_cast<long>(sizeof(Dimensions) + sizeof(double) * before);
-    const std::lock_guard lock(turn_);
-    if (std::fseek(file_, offset, SEEK_SET) != 0 ||
-        std::fread(values, sizeof(double), count, file_) != count) {
-      fail(path_,
-           "expected a whole table, found its end earlier; did the file change while it was read?");
-    }
+    file_.read(sizeof(Dimensions) + sizeof(double) * before, values, sizeof(double) * count);
   }
 
   // The i-th of 180 steps of phi_d of a piece. Of 360, phi_d and phi_d + 180 deg are the same bin
@@ -177,32 +124,17 @@ class RowReader {
     return merged(values[p], values[p + Measurement::phi_d_bins]);
   }
 
-  const std::filesystem::path& path_;
-  std::FILE* const file_;
+  const InputFile& file_;
   const int phi_bins_;
-  std::mutex turn_;
 };
 
 }  // namespace
 
-Measurement read_merl(const std::filesystem::path& path, int threads) {
-  const File file = open_for_reading(path);
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) fail(path, "expected a readable file, found: " + error.message() + ".");
-  const Dimensions found = read_dimensions(path, file.get(), size);
-  check_dimensions(path, found);
-  check_size(path, bytes_of(found), size);
-  RowReader reader(path, file.get(), found[2]);
-  const Measurement::FillRows fill = [&](int h, const Measurement::Rows& rows) { reader(h, rows); };
-  Measurement measurement(fill, threads);
-  if (measurement.bins().valid == 0) {
-    const BinCounts& bins = measurement.bins();
-    fail(path, "expected reflectances, found no valid bin (" + with_commas(bins.negative) +
-                   " negative, " + with_commas(bins.non_finite) + " not finite, " +
-                   with_commas(bins.below_horizon) + " below the horizon).");
-  }
-  return measurement;
+Measurement read_merl(const InputFile& file, int threads) {
+  const Dimensions found = read_dimensions(file);
+  check_dimensions(file, found);
+  check_size(file, bytes_of(found));
+  return Measurement(RowReader(file, found[2]), threads);
 }
 
 void write_merl(const Measurement& measurement, const std::filesystem::path& path) {
@@ -210,9 +142,10 @@ void write_merl(const Measurement& measurement, const std::filesystem::path& pat
   const auto give_up = [&](const std::string& why) {
     std::error_code ignored;
     std::filesystem::remove(aside, ignored);
-    fail(path, "expected to write a MERL table of " + with_commas(bytes_of(dimensions)) +
-                   " bytes, found: " + why + ".");
+    throw InputError(path.string() + ": expected to write a MERL table of " +
+                     with_commas(bytes_of(dimensions)) + " bytes, found: " + why + ".");
   };
+  const auto reason = [] { return std::string(std::strerror(errno)); };
   File file(std::fopen(aside.c_str(), "wb"));
   if (!file) give_up(reason());
   std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());

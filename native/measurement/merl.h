@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "measurement/input_file.h"
 #include "measurement/measurement.h"
 
 namespace lobefit {
@@ -11,10 +12,9 @@ namespace lobefit {
 // planes of 90*90*180 little-endian float64 in [theta_h][theta_d][phi_d] order. The stored value
 // times 1/1500 (red), 1.15/1500 (green), 1.66/1500 (blue) is the reflectance in 1/sr. Files with
 // 360 steps of phi_d hold each bin twice (phi_d and phi_d + 180 deg): the two are averaged, or
-// the usable one of them is taken. Throws InputError when the file cannot be read, is not exactly
-// of its size, has other dimensions or holds no valid bin. threads: at most so many, 0 for every
-// processor.
-Measurement read_merl(const std::filesystem::path& path, int threads = 0);
+// the usable one of them is taken. Throws InputError when the file is not exactly of its size or
+// has other dimensions. threads: at most so many, 0 for every processor.
+Measurement read_merl(const InputFile& file, int threads = 0);
 
 // Writes the layout that read_merl reads, with -1 in invalid bins, beside its place and then
 // renames it, so that an interrupted write leaves no half file. Throws InputError.

@@ -29,10 +29,12 @@
 #include "fitting/samples.h"
 #include "fitting/variables.h"
 #include "measurement/input_error.h"
+#include "measurement/input_file.h"
 #include "measurement/measurement.h"
 #include "measurement/merl.h"
 #include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
+#include "measurement/rgl.h"
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
 #include "reflectance/model.h"
@@ -274,7 +276,8 @@ py::dict to_dict(const RecordContents& contents, const FitOptions& options) {
       "albedo"_a = py::dict("view_angle"_a = contents.albedo.view_angle,
                             "measured"_a = to_list(contents.albedo.measured),
                             "model"_a = to_list(contents.albedo.model)),
-      "warnings"_a = fit.warnings, "bins"_a = to_dict(contents.bins), "format"_a = "MERL",
+      "warnings"_a = fit.warnings, "bins"_a = to_dict(contents.bins),
+      "format"_a = contents.measurement->source().format,
       "principled"_a = to_dict(contents.principled));
 }
 
@@ -541,7 +544,8 @@ void bind_job_methods(py::class_<Owner>& bound, auto job_of) {
 
 void bind_measurement(py::module_& module) {
   py::class_<Measurement, SharedMeasurement>(
-      module, "Measurement", "A measured isotropic reflectance on the MERL grid, in 1/sr.")
+      module, "Measurement",
+      "A measured isotropic reflectance on the grid of MERL tables, in 1/sr.")
       .def_static(
           "read",
           [](const std::filesystem::path& path) {
@@ -558,7 +562,10 @@ void bind_measurement(py::module_& module) {
       .def_property_readonly("values", &values_of,
                              "(3, 90, 90, 180) in 1/sr, NaN where invalid; read-only.")
       .def_property_readonly("bins", [](const Measurement& m) { return to_dict(m.bins()); })
-      .def_property_readonly("format", [](const Measurement&) { return "MERL"; })
+      .def_property_readonly("format", [](const Measurement& m) { return m.source().format; })
+      .def_property_readonly(
+          "warnings", [](const Measurement& m) { return m.source().warnings; },
+          "What a user should know of how the file was read.")
       .def(
           "evaluate",
           [](const SharedMeasurement& m, const DirectionArray& wi, const DirectionArray& wo) {
@@ -573,6 +580,29 @@ void bind_measurement(py::module_& module) {
             write_merl(m, path);
           },
           py::arg("path"), "Writes a MERL .binary file.");
+}
+
+void bind_rgl(py::module_& module) {
+  py::class_<Rgl, std::shared_ptr<Rgl>>(module, "Rgl",
+                                        "An RGL measurement at any directions, not as a table.")
+      .def(py::init([](const std::filesystem::path& path) {
+             const py::gil_scoped_release release;
+             return std::make_shared<Rgl>(InputFile(path));
+           }),
+           py::arg("path"), "Reads a file; InputError says what is wrong with it.")
+      .def_property_readonly("isotropic", &Rgl::isotropic)
+      .def(
+          "evaluate",
+          [](const std::shared_ptr<Rgl>& rgl, const DirectionArray& wi, const DirectionArray& wo) {
+            return evaluate_rows(
+                [&](const Vector3& light, const Vector3& viewer) {
+                  return rgl->evaluate(light, viewer);
+                },
+                wi, wo);
+          },
+          py::arg("wi"), py::arg("wo"),
+          "f cos(theta_o) in 1/sr, (N, 3), as the file tells it: not made reciprocal, and negative "
+          "where a colour is beyond the gamut.");
 }
 
 void bind_jobs(py::module_& module) {
@@ -693,6 +723,7 @@ PYBIND11_MODULE(_native, module) {
   module.attr("build_id") = LOBEFIT_BUILD_ID;
   lobefit::bind_errors(module);
   lobefit::bind_measurement(module);
+  lobefit::bind_rgl(module);
   lobefit::bind_jobs(module);
   lobefit::bind_functions(module);
   lobefit::bind_methods(module);

@@ -109,7 +109,7 @@ void copy_table(benchmark::State& state) {
 }
 
 void read_table(benchmark::State& state) {
-  time_work(state, [] { benchmark::DoNotOptimize(read_merl(file())); });
+  time_work(state, [] { benchmark::DoNotOptimize(read_merl(InputFile(file()))); });
 }
 
 void lay_samples_out(benchmark::State& state) {

@@ -12,6 +12,7 @@ import bpy
 import lobefit
 import numpy as np
 import pytest
+import rgl_file
 
 RENDER = """
 import sys
@@ -42,6 +43,25 @@ def test_import_makes_a_material(addon, measured_file):
     assert sorted(node.target for node in outputs) == ["ALL", "CYCLES"]
     assert [node.target for node in outputs if node.is_active_output] == ["ALL"]
     assert material.use_fake_user
+
+
+@pytest.mark.parametrize("phi_i", [(0.0,), (-1.6, -0.8, 0.0)], ids=["isotropic", "anisotropic"])
+def test_an_rgl_file_ends_in_a_material(addon, tmp_path, phi_i):
+    fields = rgl_file.glossy_fields(phi_i, elevations=4, size=16)
+    path = rgl_file.write_tensor_file(tmp_path / "glossy.bsdf", fields)
+    assert bpy.ops.lobefit.import_measured(filepath=str(path)) == {"FINISHED"}
+    (material,) = bpy.data.materials
+    record = lobefit.Record.from_json(material["lobefit_record"])
+    assert record.source["format"] == "RGL"
+    assert any("anisotropic" in warning for warning in record.warnings) == (len(phi_i) > 1)
+    assert any(node.type == "GROUP" for node in material.node_tree.nodes)
+
+
+def test_both_formats_can_be_chosen_and_dropped(addon):
+    (handler,) = (h for h in bpy.types.FileHandler.__subclasses__() if "measured" in h.bl_idname)
+    assert handler.bl_file_extensions == ".binary;.bsdf"
+    operator = bpy.ops.lobefit.import_measured.get_rna_type()
+    assert operator.properties["filter_glob"].default == "*.binary;*.bsdf"
 
 
 def test_import_into_the_active_object(addon, measured_file):
@@ -75,6 +95,8 @@ BAD_FILES = {
     "too_long": struct.pack("<3i", 90, 90, 180) + bytes(8 * VALUES + 8),
     "invalid": struct.pack("<3i", 90, 90, 180) + struct.pack("<d", -1.0) * VALUES,
     "nan": struct.pack("<3i", 90, 90, 180) + struct.pack("<d", float("nan")) * VALUES,
+    "of_zemax": b"Source  Measured\r\nSymmetry  PlaneSymmetrical\r\n",
+    "cut_tensor_file": b"tensor_file\0\1\0\x0b\0\0\0\x07\0",
 }
 
 

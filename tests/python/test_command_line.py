@@ -41,7 +41,7 @@ def folder(path: Path) -> Path:
 
 BAD_FILES = {
     "empty": (lambda path: written(path, b""), "empty"),
-    "text": (lambda path: written(path, b"diffuse 0.1 0.2 0.3\n" * 20), "90 x 90 x 180 bins"),
+    "text": (lambda path: written(path, b"diffuse 0.1 0.2 0.3\n" * 20), "found text"),
     "cut in its head": (lambda path: written(path, b"\x5a\0\0\0"), "bytes"),
     "truncated": (lambda path: cut(path, BYTES // 2), "34,992,012 bytes, found 17,496,006"),
     "a byte short": (lambda path: cut(path, BYTES - 1), "found 34,992,011"),
@@ -87,8 +87,9 @@ def test_a_folder_is_no_measurement(tmp_path, capfd):
     assert "found a folder" in refuse(capfd, "info", folder(tmp_path / "bad.binary"))
 
 
-def test_an_unknown_suffix_is_named(tmp_path, capfd):
-    assert ".exr" in refuse(capfd, "info", written(tmp_path / "picture.exr", b"v/1\1"))
+def test_another_format_is_told_by_what_is_in_it(tmp_path, capfd):
+    picture = written(tmp_path / "picture.exr", b"v/1\1\2\0\0\0channels\0chlist\0")
+    assert "is this another format?" in refuse(capfd, "info", picture)
 
 
 def test_a_file_without_permission_is_named(tmp_path, capfd):

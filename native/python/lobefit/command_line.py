@@ -359,7 +359,7 @@ def _info(options: argparse.Namespace) -> int:
             return
         measurement = read(path)
         bins, origin = dict(measurement.bins), origin_of(path)
-        warnings = _bin_warnings(bins)
+        warnings = measurement.warnings + _bin_warnings(bins)
         if options.json:
             facts = origin.entries() | {"format": measurement.format, "bytes": path.stat().st_size}
             print(json.dumps(facts | {"bins": bins, "warnings": warnings}))

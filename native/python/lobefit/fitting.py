@@ -27,9 +27,10 @@ _RECORD_KEYS = ("schedule", "norm", "channels", "max_angle")
 
 
 def read(path: str | os.PathLike[str]) -> Measurement:
-    """The measurement in the file `path` (MERL `.binary`), values in 1/sr, NaN in invalid bins.
+    """The measurement in the file `path`, values in 1/sr, NaN in invalid bins.
 
-    Raises InputError with one sentence for anything that is not such a file.
+    The file is a MERL table (`.binary`) or an RGL measurement (`.bsdf`), told apart by what is in
+    it. Raises InputError with one sentence for anything that is not such a file.
     """
     return Measurement.read(os.fspath(path))
 

@@ -11,7 +11,7 @@ from lobefit.fitting import Closures, fit
 from lobefit.origin import origin_of
 from lobefit.record import MODELS, Record
 
-MEASUREMENT_SUFFIXES = (".binary",)
+MEASUREMENT_SUFFIXES = (".binary", ".bsdf")
 RECORD_SUFFIX = ".json"
 _KEPT_OPTIONS = ("schedule", "norm", "channels", "max_angle")
 
