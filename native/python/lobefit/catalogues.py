@@ -41,8 +41,8 @@ class Catalogues:
     def identifier(self, path: str) -> str:
         """The UUID of the catalogue `path`, which is added where it is missing.
 
-        It is the same on every machine, unless the file gives the catalogue another one. A catalogue
-        that was renamed keeps its UUID, and so its materials.
+        It is the same on every machine, unless the file gives the catalogue another one. One that
+        was renamed keeps its UUID, and so its materials.
         """
         if path not in self._ids:
             name = uuid.uuid5(uuid.NAMESPACE_URL, f"lobefit:{path}")

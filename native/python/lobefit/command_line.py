@@ -121,9 +121,7 @@ def part_of(bar: Bar, start: float, end: float) -> Bar:
     @contextmanager
     def part(name: str) -> Iterator[Progress | None]:
         with bar(name) as progress:
-            yield progress and (
-                lambda share, stage: progress(start + share * (end - start), stage)
-            )
+            yield progress and (lambda share, stage: progress(start + share * (end - start), stage))
 
     return part
 
@@ -661,20 +659,14 @@ def _library(options: argparse.Namespace) -> int:
     bar = progress_lines if options.json else progress_bar
     code = _run(options, tasks, not options.again, show, part_of(bar, 0.0, 1 - _WRITING))
     if records:
-        contents = [
-            (records[item.place], item.asset) for item in items if item.place in records
-        ]
+        contents = [(records[item.place], item.asset) for item in items if item.place in records]
         with part_of(bar, 1 - _WRITING, 1.0)(Path(options.output).name) as progress:
-            result = blender.write_library(
-                options.output, contents, options.kind, count, progress
-            )
+            result = blender.write_library(options.output, contents, options.kind, count, progress)
         if options.json:
             print(json.dumps({"library": options.output} | result), flush=True)
         else:
-            print(
-                f"{options.output}: {result['materials']} materials in "
-                f"{', '.join(result['catalogues'])}; opens in Blender {result['opens_in']} and later"
-            )
+            told = f"{result['materials']} materials in {', '.join(result['catalogues'])}"
+            print(f"{options.output}: {told}; opens in Blender {result['opens_in']} and later")
     return code
 
 

@@ -61,7 +61,8 @@ def records_folder(library: str | os.PathLike[str]) -> Path:
 def items_of(names: Sequence[str], records: Path) -> list[Item]:
     """The files of a library: those named, and all in and below the folders named.
 
-    Their records stand in the folder `records` as the files stand in what was named. Raises InputError for a folder that holds none and for a list with a fault.
+    Their records stand in the folder `records` as the files stand in what was named. Raises
+    InputError for a folder that holds none and for a list with a fault.
     """
     list_in = cache(_list_in)
     items = []
