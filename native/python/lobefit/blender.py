@@ -155,6 +155,38 @@ def costs(record: Record) -> dict[tuple[str, int | None], float]:
     return {way: cost.seconds for way, cost in measured.items()}
 
 
+def records_in(path: str | os.PathLike[str]) -> dict[str, str]:
+    """The records, in JSON, of the materials of a Blender file, by the names of the materials."""
+    _open(path)
+    import bpy
+    from lobefit_addon.records import KEY
+
+    return {item.name_full: str(item[KEY]) for item in bpy.data.materials if KEY in item}
+
+
+def export_principled(path: str | os.PathLike[str], name: str, record: Record) -> None:
+    """Writes a sphere of a record's Principled BSDF, by Blender's exporter of glTF or of USD.
+
+    The suffix of `path` tells which, .glb or .usdc; `name` is that of the material.
+    """
+    import bpy
+    from lobefit_addon import build_material
+    from lobefit_addon.scene import sphere_mesh
+
+    with quiet():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        mesh = sphere_mesh(build_material(record, "principled", name), subdivisions=5)
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+    with written_aside(path) as aside, quiet():
+        export = bpy.ops.wm.usd_export
+        if aside.suffix == ".glb":
+            export = bpy.ops.export_scene.gltf
+        try:
+            export(filepath=str(aside.absolute()))
+        except RuntimeError as error:
+            raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
+
+
 def simplify(
     path: str | os.PathLike[str],
     output: str | os.PathLike[str] | None,

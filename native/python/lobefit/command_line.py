@@ -16,9 +16,19 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from lobefit import _native, blender, methods, picture, pictures, preview, report, simplified
+from lobefit import (
+    _native,
+    blender,
+    export,
+    methods,
+    picture,
+    pictures,
+    preview,
+    report,
+    simplified,
+)
 from lobefit._native import Cancelled, InputError
-from lobefit.atomic import make_folder, place_to_write
+from lobefit.atomic import make_folder, place_to_write, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
@@ -159,6 +169,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_preview,
         _add_material,
         _add_library,
+        _add_export,
         _add_simplify,
         _add_report,
     ):
@@ -341,6 +352,18 @@ def _add_library(commands: Any) -> None:
         help="its records stay in OUT.records beside it, so that it goes on where it stopped",
     )
     _add_batch_options(command)
+
+
+def _add_export(commands: Any) -> None:
+    command = _add(
+        commands, _export, "write what the measured materials of a Blender file hold (needs bpy)"
+    )
+    command.add_argument("file", metavar="FILE.blend")
+    group = command.add_argument_group("what to write; without any of them, all")
+    for kind, text in export.KINDS.items():
+        group.add_argument(f"--{kind}", dest="kinds", action="append_const", const=kind, help=text)
+    command.add_argument("-o", dest="output", required=True, metavar="DIR")
+    _add_json(command)
 
 
 def _add_simplify(commands: Any) -> None:
@@ -667,6 +690,30 @@ def _library(options: argparse.Namespace) -> int:
         else:
             told = f"{result['materials']} materials in {', '.join(result['catalogues'])}"
             print(f"{options.output}: {told}; opens in Blender {result['opens_in']} and later")
+    return code
+
+
+def _export(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    texts = blender.records_in(options.file)
+    if not texts:
+        raise InputError(f"{options.file}: expected a measured material, found none.")
+    folder, kinds = make_folder(options.output), options.kinds or export.KINDS
+    records: dict[str, Record] = {}
+
+    def tell(path: Path) -> None:
+        print(json.dumps({"path": str(path)}) if options.json else path)
+
+    def write(named: tuple[str, Path]) -> None:
+        name, stem = named
+        record = records[name] = Record.from_json(texts[name], f"{options.file}, {name}")
+        for path in export.write_material(record, name, stem, kinds):
+            tell(path)
+
+    code = for_each(export.places_in(folder, texts), write)
+    if records and "csv" in kinds:
+        write_bytes(folder / export.TABLE, export.table(records).encode())
+        tell(folder / export.TABLE)
     return code
 
 
