@@ -4,45 +4,23 @@ import json
 import os
 import signal
 import socket
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from lobefit import InputError, Record, batch, blender
+from lobefit import InputError, batch, blender
 from lobefit.batch import Batch, Task, tasks_in
 from lobefit.command_line import main
 from lobefit.origin import origin_of, write_samples
+from processes import PATIENCE, await_that, finished, start
 
-PATIENCE = 60  # seconds after which what should have happened never will
 # All that a record may hold, and no more work than that takes.
 EVERYTHING = ["closures", "--closures", "1", "--uncertainty"]
 MANY = 8
 NAMES = {f"{index}.json" for index in range(MANY)}
-
-
-def await_that(holds: Callable[[], object], process: subprocess.Popen | None = None) -> None:
-    end = time.monotonic() + PATIENCE
-    while not holds():
-        assert time.monotonic() < end
-        assert process is None or process.poll() is None, "it ended too early"
-        time.sleep(0.02)
-
-
-def start(*arguments) -> subprocess.Popen:
-    """Lobefit in a session of its own, in which Ctrl-C is not ignored."""
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "lobefit", *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
 
 
 def processes_of(session: int) -> dict[int, str]:
@@ -61,16 +39,6 @@ def processes_of(session: int) -> dict[int, str]:
 
 def workers_of(session: int) -> list[int]:
     return [pid for pid, command in processes_of(session).items() if "spawn_main" in command]
-
-
-def finished(folder: Path) -> dict[str, int]:
-    """When each record of a folder was written; no other file, and no half one, is in it."""
-    times = {}
-    if folder.is_dir():
-        for path in folder.glob("[!.]*"):
-            Record.load(path)
-            times[path.name] = path.stat().st_mtime_ns
-    return times
 
 
 def results(folder: Path) -> dict[str, object]:
