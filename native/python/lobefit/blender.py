@@ -306,6 +306,12 @@ def _save_as(aside: Path, path: str | os.PathLike[str]) -> None:
             bpy.ops.wm.save_as_mainfile(filepath=str(aside.absolute()), copy=True, compress=True)
         except RuntimeError as error:
             raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
+        try:
+            # Blender does not tell when the disk is full at the last of its blocks.
+            with bpy.data.libraries.load(str(aside.absolute())):
+                pass
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written, its end is missing.") from error
 
 
 @contextmanager
