@@ -2,7 +2,8 @@
 
 import bpy
 
-from . import library, preview
+from . import export, library, preview
+from .export import LOBEFIT_OT_export_measured
 from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .import_measured import LOBEFIT_FH_measured, LOBEFIT_OT_import_measured, draw_menu
 from .library import LOBEFIT_OT_add_asset_library, LOBEFIT_OT_make_library
@@ -18,6 +19,15 @@ _CLASSES = (
     LOBEFIT_OT_restore_scene,
     LOBEFIT_OT_make_library,
     LOBEFIT_OT_add_asset_library,
+    LOBEFIT_OT_export_measured,
+)
+
+# What the operators add to menus of Blender's.
+_ENTRIES = (
+    ("TOPBAR_MT_file_import", draw_menu),
+    ("TOPBAR_MT_file_import", library.draw_import_menu),
+    ("TOPBAR_MT_file_export", export.draw_menu),
+    ("ASSETBROWSER_MT_asset", library.draw_asset_menu),
 )
 
 
@@ -25,18 +35,16 @@ def register() -> None:
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     preview.register()
-    bpy.types.TOPBAR_MT_file_import.append(draw_menu)
-    bpy.types.TOPBAR_MT_file_import.append(library.draw_import_menu)
-    bpy.types.ASSETBROWSER_MT_asset.append(library.draw_asset_menu)
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).append(entry)
 
 
 def unregister() -> None:
     # Blender does not call an operator's `cancel` when its class goes.
     if current():
         current().end()
-    bpy.types.ASSETBROWSER_MT_asset.remove(library.draw_asset_menu)
-    bpy.types.TOPBAR_MT_file_import.remove(library.draw_import_menu)
-    bpy.types.TOPBAR_MT_file_import.remove(draw_menu)
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).remove(entry)
     preview.unregister()
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

@@ -12,6 +12,7 @@ import pytest
 OPERATORS = [
     "add_asset_library",
     "cancel_fit",
+    "export_measured",
     "fit",
     "import_measured",
     "make_library",
@@ -83,8 +84,9 @@ def native(addon):
 
 def test_registering_again_leaves_nothing(addon):
     def ours():
-        names = ("TOPBAR_MT_file_import", "STATUSBAR_HT_header", "ASSETBROWSER_MT_asset")
-        drawn = [getattr(bpy.types, name) for name in names]
+        names = ("MT_file_import", "MT_file_export")
+        drawn = [getattr(bpy.types, f"TOPBAR_{name}") for name in names]
+        drawn += [bpy.types.STATUSBAR_HT_header, bpy.types.ASSETBROWSER_MT_asset]
         functions = [f.__module__ for menu in drawn for f in menu.draw._draw_funcs]
         types = [name for name in dir(bpy.types) if name.startswith("LOBEFIT_")]
         return types, [name for name in functions if name.startswith(addon.__name__)]

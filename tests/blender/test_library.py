@@ -160,6 +160,54 @@ def test_an_asset_is_fitted_anew_from_its_file(addon, library, measured_file, tm
     )
 
 
+def test_export_of_the_open_file(addon, material, tmp_path):
+    material.name = "not saved"
+    out = tmp_path / "out"
+    assert bpy.ops.lobefit.export_measured(directory=str(out), gltf=True) == {"FINISHED"}
+    names = ["not saved.glb", "not saved.json", "parameters.csv"]
+    assert sorted(os.listdir(out)) == names
+    exported = lobefit.Record.load(out / "not saved.json")
+    assert exported.to_json() == material["lobefit_record"]
+    nothing = {kind: False for kind in ("records", "csv")}
+    with pytest.raises(RuntimeError, match="found none chosen"):
+        bpy.ops.lobefit.export_measured(directory=str(out), **nothing)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RuntimeError, match="expected a folder, found a file"):
+        bpy.ops.lobefit.export_measured(directory=str(tmp_path / "file"))
+    bpy.data.materials.remove(material)
+    assert not bpy.ops.lobefit.export_measured.poll()
+
+
+def drawn(menu):
+    """The texts and operators of our entries in a menu of Blender's."""
+    shown = []
+
+    class Layout:
+        def operator(self, idname, text="", icon="NONE"):
+            shown.append((idname, text))
+            return type("Options", (), {})()
+
+        def separator(self):
+            pass
+
+    for entry in menu.draw._draw_funcs:
+        if entry.__module__.startswith(EXTENSION):
+            entry(type("Menu", (), {"layout": Layout()})(), bpy.context)
+    return shown
+
+
+def test_menus(addon, library, no_libraries):
+    assert ("lobefit.make_library", "Measured BRDF Library") in drawn(
+        bpy.types.TOPBAR_MT_file_import
+    )
+    assert drawn(bpy.types.TOPBAR_MT_file_export) == [("lobefit.export_measured", "Measured BRDFs")]
+    make, add = drawn(bpy.types.ASSETBROWSER_MT_asset)
+    assert make[0] == "lobefit.make_library"
+    assert add == ("lobefit.add_asset_library", "Add metals to Asset Libraries")
+    bpy.ops.lobefit.add_asset_library(directory=str(library.parent))
+    assert drawn(bpy.types.ASSETBROWSER_MT_asset) == [make]
+
+
 @pytest.fixture
 def child(addon, folder, measured_file):
     """A library of three tables under way in another Blender."""
