@@ -187,6 +187,20 @@ def export_principled(path: str | os.PathLike[str], name: str, record: Record) -
             raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
 
 
+def leave_after_gltf(code: int) -> int:
+    """The exit code, for a program that ends now; it does not return where the end would crash.
+
+    The bpy 4.2 wheel does, after its exporter of glTF has run.
+    """
+    import bpy
+
+    if bpy.app.version < (4, 3) and not is_this_program():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
 def simplify(
     path: str | os.PathLike[str],
     output: str | os.PathLike[str] | None,

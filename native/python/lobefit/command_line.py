@@ -714,7 +714,7 @@ def _export(options: argparse.Namespace) -> int:
     if records and "csv" in kinds:
         write_bytes(folder / export.TABLE, export.table(records).encode())
         tell(folder / export.TABLE)
-    return code
+    return blender.leave_after_gltf(code) if "gltf" in kinds else code
 
 
 def _simplify(options: argparse.Namespace) -> int:
