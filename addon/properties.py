@@ -33,26 +33,15 @@ KINDS = (
 )
 
 
-class FitOptions:
-    """How to fit and what to make of it; mixed into operators."""
+class _ModelOptions:
+    """What to fit, and the closures to find."""
 
-    kind: EnumProperty(
-        name="Kind", items=KINDS, default="measured", description="What Cycles renders"
-    )
     count: IntProperty(
         name="Closures",
         default=2,
         min=0,
         max=3,
         description="Specular closures of the kinds Measured and Lobe, besides a diffuse one",
-    )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        default=5.0,
-        min=0.0,
-        max=100.0,
-        subtype="PERCENTAGE",
-        description="How much of the reflected light the kind Auto may have off",
     )
     cap_albedo: BoolProperty(
         name="Cap Albedo",
@@ -77,6 +66,22 @@ class FitOptions:
     )
     threads: IntProperty(
         name="Threads", default=0, min=0, max=1024, description="Processors to use; 0 for all"
+    )
+
+
+class FitOptions(_ModelOptions):
+    """How to fit and what to make of it; mixed into operators."""
+
+    kind: EnumProperty(
+        name="Kind", items=KINDS, default="measured", description="What Cycles renders"
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        default=5.0,
+        min=0.0,
+        max=100.0,
+        subtype="PERCENTAGE",
+        description="How much of the reflected light the kind Auto may have off",
     )
 
     def fit_options(self) -> dict[str, Any]:
@@ -106,7 +111,7 @@ def draw_fit_options(layout: Any, options: Any) -> None:
         layout.prop(options, name)
 
 
-class LibraryOptions(FitOptions):
+class LibraryOptions(_ModelOptions):
     """How to fit the files of a library; mixed into an operator."""
 
     # `auto` judges by a tolerance, and a record does not tell whether it was made for the same.

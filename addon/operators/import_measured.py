@@ -13,7 +13,24 @@ from ..properties import draw_fit_options
 from .run import RunsFits
 
 
-class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
+class ChoosesFiles(ImportHelper):
+    """What operators have in common that ask for several files of a folder."""
+
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    def chosen(self) -> list[Path]:
+        """The files that were chosen; none where only a folder was."""
+        folder = Path(bpy.path.abspath(self.directory))
+        names = [folder / item.name for item in self.files if item.name]
+        if names or not Path(self.filepath).name:
+            return names
+        return [Path(bpy.path.abspath(self.filepath))]
+
+
+class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
     """Fit measured reflectance files and make a material of each"""
 
     bl_idname = "lobefit.import_measured"
@@ -22,10 +39,6 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
 
     filename_ext = ".binary"
     filter_glob: StringProperty(default="*.binary;*.bsdf", options={"HIDDEN"})
-    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
-    )
     assign: BoolProperty(
         name="Assign to Object",
         default=True,
@@ -39,11 +52,10 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        names = [item.name for item in self.files if item.name]
-        paths = [str(Path(self.directory) / name) for name in names] or [self.filepath]
-        if not Path(paths[0]).name:
+        paths = self.chosen()
+        if not paths:
             return self.refuse("Expected at least one measured file, found none chosen.")
-        return self.fit(context, [bpy.path.abspath(path) for path in paths])
+        return self.fit(context, list(map(str, paths)))
 
     def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
         options = self.material_options()

@@ -4,18 +4,18 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
+from bpy.props import BoolProperty, StringProperty
 
 from .. import native
 from ..child import Child
 from ..properties import LibraryOptions, draw_library_options
+from .import_measured import ChoosesFiles
 from .run import RunsWork
 
 _made: list[Path] = []  # the folders of libraries that were made, as long as Blender runs
 
 
-class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, ImportHelper):
+class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, ChoosesFiles):
     """Fit measured reflectance files, or all of a folder, into a file of material assets"""
 
     bl_idname = "lobefit.make_library"
@@ -23,10 +23,6 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Impo
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
     filter_glob: StringProperty(default="*.binary;*.json", options={"HIDDEN"})
-    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
-    )
     library: StringProperty(
         name="Library",
         subtype="FILE_PATH",
@@ -43,14 +39,13 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Impo
         problem = native.problem()
         if problem:
             return self.refuse(problem)
-        folder = Path(bpy.path.abspath(self.directory or self.filepath))
-        names = [item.name for item in self.files if item.name]
-        if not (self.directory or self.filepath) or not folder.exists():
+        # Where no file was chosen, the folder was.
+        sources = self.chosen() or [Path(bpy.path.abspath(self.directory))]
+        if not sources[0].name:
             return self.refuse("Expected measured files or a folder of them, found none chosen.")
-        sources = [str(folder / name) for name in names] or [str(folder)]
-        place = folder if folder.is_dir() else folder.parent
-        library = Path(bpy.path.abspath(self.library) or place / f"{place.name}.blend")
-        return self.start(context, Child(self.command(sources, str(library))))
+        folder = sources[0] if sources[0].is_dir() else sources[0].parent
+        library = bpy.path.abspath(self.library) or str(folder / f"{folder.name}.blend")
+        return self.start(context, Child(self.command(list(map(str, sources)), library)))
 
     def conclude(self, context: bpy.types.Context, work: Child) -> set[str]:
         made = [result for result in work.results if "library" in result]

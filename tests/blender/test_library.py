@@ -79,6 +79,11 @@ def test_a_library_of_a_folder(addon, library, record, no_libraries):
     catalogues = (library.parent / "blender_assets.cats.txt").read_text()
     assert f"{material.asset_data.catalog_id}:Polished:Polished" in catalogues
     assert not len(no_libraries)
+    # As the file browser gives a folder of which no file was chosen.
+    (library.parent / "materials.csv").write_text("file,name\nPolished/nickel,Renamed\n")
+    chosen = {"directory": f"{library.parent}/", "filepath": f"{library.parent}/"}
+    bpy.ops.lobefit.make_library(files=[{"name": ""}], count=1, **chosen)
+    assert load(library, link=False).name == "Renamed"
 
 
 def test_options_reach_the_command(addon, folder, measured_file, tmp_path):
