@@ -15,10 +15,12 @@ import bpy
 _READ = 1 << 16  # bytes at once
 _PATIENCE = 5  # seconds a process has to end by itself
 
-# SIGTERM ends it as Ctrl-C would, so that nothing half-written stays behind.
+# SIGTERM ends it as Ctrl-C would, so that nothing half-written stays behind. What Blender runs from
+# its command line names a file, "<blender string>", that processes of Python would look for.
 _PROGRAM = """
 import signal, sys
 signal.signal(signal.SIGTERM, signal.default_int_handler)
+globals().pop("__file__", None)
 sys.path.insert(0, {folder!r})
 from lobefit.command_line import main
 sys.exit(main(sys.argv[sys.argv.index("--") + 1:]))

@@ -27,7 +27,7 @@ _ENTRIES = (
     ("TOPBAR_MT_file_import", draw_menu),
     ("TOPBAR_MT_file_import", library.draw_import_menu),
     ("TOPBAR_MT_file_export", export.draw_menu),
-    ("ASSETBROWSER_MT_asset", library.draw_asset_menu),
+    ("ASSETBROWSER_MT_catalog", library.draw_catalog_menu),
 )
 
 

@@ -21,6 +21,12 @@ class ChoosesFiles(ImportHelper):
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
     )
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Asks for files, unless they were dropped."""
+        if self.directory:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
     def chosen(self) -> list[Path]:
         """The files that were chosen; none where only a folder was."""
         folder = Path(bpy.path.abspath(self.directory))
@@ -44,12 +50,6 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
         default=True,
         description="Put the first material into the active object's active slot",
     )
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Asks for files, unless they were dropped."""
-        if self.directory and self.files:
-            return self.execute(context)
-        return ImportHelper.invoke(self, context, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         paths = self.chosen()

@@ -108,8 +108,8 @@ def draw_import_menu(self: Any, context: bpy.types.Context) -> None:
     )
 
 
-def draw_asset_menu(self: Any, context: bpy.types.Context) -> None:
-    """The entries in the menu Asset of the Asset Browser."""
+def draw_catalog_menu(self: Any, context: bpy.types.Context) -> None:
+    """The entries in the menu Catalog of the Asset Browser."""
     self.layout.separator()
     self.layout.operator(LOBEFIT_OT_make_library.bl_idname, icon="ASSET_MANAGER")
     # One click is enough for the library that was made last.

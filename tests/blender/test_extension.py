@@ -86,7 +86,7 @@ def test_registering_again_leaves_nothing(addon):
     def ours():
         names = ("MT_file_import", "MT_file_export")
         drawn = [getattr(bpy.types, f"TOPBAR_{name}") for name in names]
-        drawn += [bpy.types.STATUSBAR_HT_header, bpy.types.ASSETBROWSER_MT_asset]
+        drawn += [bpy.types.STATUSBAR_HT_header, bpy.types.ASSETBROWSER_MT_catalog]
         functions = [f.__module__ for menu in drawn for f in menu.draw._draw_funcs]
         types = [name for name in dir(bpy.types) if name.startswith("LOBEFIT_")]
         return types, [name for name in functions if name.startswith(addon.__name__)]

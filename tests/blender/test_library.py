@@ -206,11 +206,11 @@ def test_menus(addon, library, no_libraries):
         bpy.types.TOPBAR_MT_file_import
     )
     assert drawn(bpy.types.TOPBAR_MT_file_export) == [("lobefit.export_measured", "Measured BRDFs")]
-    make, add = drawn(bpy.types.ASSETBROWSER_MT_asset)
+    make, add = drawn(bpy.types.ASSETBROWSER_MT_catalog)
     assert make[0] == "lobefit.make_library"
     assert add == ("lobefit.add_asset_library", "Add metals to Asset Libraries")
     bpy.ops.lobefit.add_asset_library(directory=str(library.parent))
-    assert drawn(bpy.types.ASSETBROWSER_MT_asset) == [make]
+    assert drawn(bpy.types.ASSETBROWSER_MT_catalog) == [make]
 
 
 @pytest.fixture

@@ -350,15 +350,6 @@ def test_a_renamed_catalogue_keeps_its_materials(tmp_path):
     assert place.read_text() == text
 
 
-def test_catalogues_of_a_folder_above_are_valid_below(tmp_path):
-    above = Catalogues(tmp_path)
-    above.identifier("Paint")
-    above.save()
-    below = tmp_path / "a" / "b"
-    below.mkdir(parents=True)
-    assert Catalogues(below).path == tmp_path / catalogues.FILE
-
-
 @pytest.mark.parametrize("text", [b"VERSION 2\n", b"VERSION 1\n\xff\n"])
 def test_catalogues_that_cannot_be_read(tmp_path, text):
     (tmp_path / catalogues.FILE).write_bytes(text)

@@ -183,6 +183,9 @@ def export_principled(path: str | os.PathLike[str], name: str, record: Record) -
             export = bpy.ops.export_scene.gltf
         try:
             export(filepath=str(aside.absolute()))
+        except AttributeError as error:
+            reason = "this Blender was built without an exporter for it"
+            raise InputError(f"{path}: cannot be written, {reason}.") from error
         except RuntimeError as error:
             raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
 

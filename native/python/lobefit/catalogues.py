@@ -19,17 +19,13 @@ _HEAD = (
 
 
 class Catalogues:
-    """The catalogues that are valid for a folder; new ones are added, every line there is kept.
+    """The catalogues of a folder; new ones are added, every line of its file is kept.
 
-    As Blender does, the file is taken from the nearest folder that has one, upward from `folder`;
-    where none has, `folder` gets one. Raises InputError for a file that cannot be read, or of
-    another version.
+    Raises InputError for a file that cannot be read, or of another version.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        start = Path(os.path.realpath(folder))
-        places = [place / FILE for place in (start, *start.parents)]
-        self.path = next((place for place in places if place.is_file()), places[0])
+        self.path = Path(folder) / FILE
         self._text = _read(self.path) if self.path.is_file() else _HEAD
         self._fresh: list[str] = []
         self._ids: dict[str, str] = {}
