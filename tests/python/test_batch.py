@@ -11,11 +11,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from commands import PATIENCE, await_that, finished, refuse, start
 from lobefit import InputError, batch, blender
 from lobefit.batch import Batch, Task, tasks_in
 from lobefit.command_line import main
 from lobefit.origin import origin_of, write_samples
-from processes import PATIENCE, await_that, finished, start
 
 # All that a record may hold, and no more work than that takes.
 EVERYTHING = ["closures", "--closures", "1", "--uncertainty"]
@@ -135,13 +135,6 @@ def test_a_bad_file_is_told_and_the_others_done(tmp_path, table, capfd):
     assert main(["fit", *map(str, files), "--jobs", "2", "-o", str(out)]) == 1
     assert capfd.readouterr().err.startswith(f"lobefit: {files[0]}: ")
     assert set(finished(out)) == set(os.listdir(out)) == {"good.json", "fine.json"}
-
-
-def refuse(capfd, *arguments) -> str:
-    assert main([str(argument) for argument in arguments]) == 2
-    out, err = capfd.readouterr()
-    assert out == "" and err.count("\n") == 1, err
-    return err
 
 
 def test_wrong_use(tmp_path, table, capfd, monkeypatch):

@@ -11,25 +11,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import PATIENCE, await_that, finished, refuse, start
 from lobefit import InputError, Record, catalogues, closures, preview
 from lobefit.catalogues import Catalogues
 from lobefit.command_line import main
 from lobefit.library import UNKNOWN, UNSORTED, items_of
-from processes import PATIENCE, await_that, finished, start
 
 MANY = 6
 
 
 def library(*arguments) -> int:
     return main(["library", *map(str, arguments)])
-
-
-def refuse(capfd, *arguments) -> str:
-    """Runs a command that has to end with 2, and returns its only line on stderr."""
-    assert main([str(argument) for argument in arguments]) == 2
-    out, err = capfd.readouterr()
-    assert out == "" and err.count("\n") == 1, err
-    return err
 
 
 def opened(path: Path) -> dict[str, object]:
@@ -138,7 +130,9 @@ def test_a_black_material_has_a_picture_that_is_not_black():
 def test_records_from_elsewhere(tmp_path, records, fitted, capfd):
     out = tmp_path / "lib.blend"
     assert library(records, "--closures", "1", "--json", "-o", out) == 0
-    lines = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    told, err = capfd.readouterr()
+    assert err == ""
+    lines = [json.loads(line) for line in told.splitlines()]
     shares = [line["progress"] for line in lines if "progress" in line]
     assert shares == sorted(shares) and shares[-1] == 1.0
     assert [line["file"] for line in lines if "file" in line] == [
@@ -175,6 +169,7 @@ def test_nothing_is_written_where_all_is_bad(tmp_path, capfd):
 def test_wrong_use(tmp_path, records, table, capfd):
     out = tmp_path / "lib.blend"
     (tmp_path / "empty").mkdir()
+    assert "ends in .blend" in refuse(capfd, "library", records, "-o", tmp_path / "lib")
     assert "*.json, found none" in refuse(capfd, "library", tmp_path / "empty", "-o", out)
     assert "does not exist" in refuse(capfd, "library", records, "-o", tmp_path / "x" / "l.blend")
     both = [tmp_path / "a" / "t.binary", tmp_path / "b" / "t.binary"]

@@ -570,7 +570,7 @@ def _run(
     batch = Batch(tasks, way, keep=keep, bar=bar)
     with closing(batch.run()) as ended:
         code = for_each(ended, show_ended)
-    if batch.kept:
+    if batch.kept and not options.json:
         kept = f"{batch.kept} of {len(tasks)} kept from before (--again computes them anew)"
         print(f"lobefit: {kept}", file=sys.stderr)
     return code
@@ -659,7 +659,8 @@ def _material(options: argparse.Namespace) -> int:
 
 def _library(options: argparse.Namespace) -> int:
     blender.need_blender()
-    place_to_write(options.output)
+    if place_to_write(options.output).suffix.lower() != ".blend":
+        raise InputError(f"{options.output}: expected a name that ends in .blend.")
     items = items_of(options.files, records_folder(options.output))
     _refuse_idle_options(options, [item.file for item in items])
     requests = closures_for(options.kind, options.closures, cap_albedo=options.cap_albedo)

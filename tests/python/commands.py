@@ -1,4 +1,4 @@
-"""Lobefit in processes of its own, and what they leave behind."""
+"""Lobefit's commands, in this process and in others, and what they leave behind."""
 
 import signal
 import subprocess
@@ -8,8 +8,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lobefit import Record
+from lobefit.command_line import main
 
 PATIENCE = 60  # seconds after which what should have happened never will
+
+
+def refuse(capfd, *arguments) -> str:
+    """Runs a command that has to end with 2, and returns its only line on stderr."""
+    assert main([str(argument) for argument in arguments]) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert err.startswith("lobefit: ")
+    assert "Traceback" not in err
+    return err
 
 
 def await_that(holds: Callable[[], object], process: subprocess.Popen | None = None) -> None:
