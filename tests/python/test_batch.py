@@ -123,7 +123,9 @@ def test_the_end_of_a_batch_is_the_end_of_its_workers(tmp_path, many, end, code)
     assert process.returncode == code
     assert err == ("lobefit: interrupted\n" if end == signal.SIGINT else "")
     await_that(lambda: not processes_of(process.pid))
-    assert set(finished(out)) == set(os.listdir(out)) < NAMES
+    assert set(finished(out)) < NAMES
+    # What is killed while it writes cannot remove the file beside the record.
+    assert end == signal.SIGKILL or set(finished(out)) == set(os.listdir(out))
 
 
 def test_a_bad_file_is_told_and_the_others_done(tmp_path, table, capfd):

@@ -682,16 +682,20 @@ def _library(options: argparse.Namespace) -> int:
 
     bar = progress_lines if options.json else progress_bar
     code = _run(options, tasks, not options.again, show, part_of(bar, 0.0, 1 - _WRITING))
-    if records:
-        contents = [(records[item.place], item.asset) for item in items if item.place in records]
+    contents = [(records[item.place], item.asset) for item in items if item.place in records]
+    if contents:
         with part_of(bar, 1 - _WRITING, 1.0)(Path(options.output).name) as progress:
             result = blender.write_library(options.output, contents, options.kind, count, progress)
-        if options.json:
-            print(json.dumps({"library": options.output} | result), flush=True)
-        else:
-            told = f"{result['materials']} materials in {', '.join(result['catalogues'])}"
-            print(f"{options.output}: {told}; opens in Blender {result['opens_in']} and later")
+        _tell_of_library(options.output, result, options.json)
     return code
+
+
+def _tell_of_library(path: str, result: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"library": path} | result), flush=True)
+        return
+    told = f"{result['materials']} materials in {', '.join(result['catalogues'])}"
+    print(f"{path}: {told}; opens in Blender {result['opens_in']} and later")
 
 
 def _export(options: argparse.Namespace) -> int:
