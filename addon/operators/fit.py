@@ -9,6 +9,7 @@ from bpy.props import StringProperty
 from ..jobs import Outcome
 from ..nodes.material import fill_material
 from ..records import active_material, record_of
+from .import_measured import MEASURED_GLOB
 from .run import RunsFits, current
 
 
@@ -25,7 +26,7 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         options={"SKIP_SAVE"},
         description="The measured file; if empty, the one of the record",
     )
-    filter_glob: StringProperty(default="*.binary", options={"HIDDEN"})
+    filter_glob: StringProperty(default=MEASURED_GLOB, options={"HIDDEN"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -12,6 +12,9 @@ from ..nodes.material import build_material
 from ..properties import draw_fit_options
 from .run import RunsFits
 
+MEASURED_SUFFIXES = (".binary", ".bsdf")
+MEASURED_GLOB = ";".join(f"*{suffix}" for suffix in MEASURED_SUFFIXES)
+
 
 class ChoosesFiles(ImportHelper):
     """What operators have in common that ask for several files of a folder."""
@@ -44,7 +47,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
     filename_ext = ".binary"
-    filter_glob: StringProperty(default="*.binary;*.bsdf", options={"HIDDEN"})
+    filter_glob: StringProperty(default=MEASURED_GLOB, options={"HIDDEN"})
     assign: BoolProperty(
         name="Assign to Object",
         default=True,
@@ -80,7 +83,7 @@ class LOBEFIT_FH_measured(bpy.types.FileHandler):
     bl_idname = "LOBEFIT_FH_measured"
     bl_label = "Measured BRDF"
     bl_import_operator = LOBEFIT_OT_import_measured.bl_idname
-    bl_file_extensions = ".binary;.bsdf"
+    bl_file_extensions = ";".join(MEASURED_SUFFIXES)
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:

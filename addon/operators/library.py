@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from .. import native
 from ..child import Child
 from ..properties import LibraryOptions, draw_library_options
-from .import_measured import ChoosesFiles
+from .import_measured import MEASURED_GLOB, ChoosesFiles
 from .run import RunsWork
 
 _made: list[Path] = []  # the folders of libraries that were made, as long as Blender runs
@@ -22,7 +22,7 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
     bl_label = "Make BRDF Library"
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
-    filter_glob: StringProperty(default="*.binary;*.json", options={"HIDDEN"})
+    filter_glob: StringProperty(default=f"{MEASURED_GLOB};*.json", options={"HIDDEN"})
     library: StringProperty(
         name="Library",
         subtype="FILE_PATH",
