@@ -4,6 +4,7 @@ What the user chose last lives with the operator (`operator_properties_last`) an
 `operators.run`: nothing of it is saved in files, which hold only the record in each material.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
@@ -32,26 +33,15 @@ KINDS = (
 )
 
 
-class FitOptions:
-    """How to fit and what to make of it; mixed into operators."""
+class _ModelOptions:
+    """What to fit, and the closures to find."""
 
-    kind: EnumProperty(
-        name="Kind", items=KINDS, default="measured", description="What Cycles renders"
-    )
     count: IntProperty(
         name="Closures",
         default=2,
         min=0,
         max=3,
         description="Specular closures of the kinds Measured and Lobe, besides a diffuse one",
-    )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        default=5.0,
-        min=0.0,
-        max=100.0,
-        subtype="PERCENTAGE",
-        description="How much of the reflected light the kind Auto may have off",
     )
     cap_albedo: BoolProperty(
         name="Cap Albedo",
@@ -76,6 +66,22 @@ class FitOptions:
     )
     threads: IntProperty(
         name="Threads", default=0, min=0, max=1024, description="Processors to use; 0 for all"
+    )
+
+
+class FitOptions(_ModelOptions):
+    """How to fit and what to make of it; mixed into operators."""
+
+    kind: EnumProperty(
+        name="Kind", items=KINDS, default="measured", description="What Cycles renders"
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        default=5.0,
+        min=0.0,
+        max=100.0,
+        subtype="PERCENTAGE",
+        description="How much of the reflected light the kind Auto may have off",
     )
 
     def fit_options(self) -> dict[str, Any]:
@@ -103,6 +109,43 @@ def draw_fit_options(layout: Any, options: Any) -> None:
         layout.prop(options, "cap_albedo")
     for name in ("model", "fresnel", "norm", "threads"):
         layout.prop(options, name)
+
+
+class LibraryOptions(_ModelOptions):
+    """How to fit the files of a library; mixed into an operator."""
+
+    # `auto` judges by a tolerance, and a record does not tell whether it was made for the same.
+    kind: EnumProperty(
+        name="Kind",
+        items=[kind for kind in KINDS if kind[0] != "auto"],
+        default="measured",
+        description="What Cycles renders",
+    )
+    jobs: IntProperty(
+        name="Jobs",
+        default=2,
+        min=1,
+        max=1024,
+        description="Files at once, each with its share of the processors",
+    )
+
+    def command(self, sources: Sequence[str], library: str) -> list[str]:
+        """The words of the command line that makes the library."""
+        words = ["library", *sources, "-o", library, "--json", "--kind", self.kind]
+        words += ["--closures", str(self.count), "--jobs", str(self.jobs)]
+        words += ["--cap-albedo"] if self.cap_albedo else []
+        # Options of a fit are refused where all files are records.
+        for name in ("model", "norm"):
+            if self.properties.is_property_set(name):
+                words += [f"--{name}", getattr(self, name)]
+        words += [] if self.fresnel else ["--no-fresnel"]
+        return [*words, "--threads", str(self.threads)]
+
+
+def draw_library_options(layout: Any, options: Any) -> None:
+    """Draws the options; `options` is an operator or its last properties."""
+    draw_fit_options(layout, options)
+    layout.prop(options, "jobs")
 
 
 class SimplifyOptions:

@@ -98,11 +98,11 @@ def radiance(scene: bpy.types.Scene) -> NDArray[np.float32]:
         return _read_pixels(path)
 
 
-def sphere_mesh(material: bpy.types.Material | None) -> bpy.types.Mesh:
+def sphere_mesh(material: bpy.types.Material | None, subdivisions: int = 6) -> bpy.types.Mesh:
     """A smooth unit sphere of the material."""
     mesh = bpy.data.meshes.new("Sphere")
     shape = bmesh.new()
-    bmesh.ops.create_icosphere(shape, subdivisions=6, radius=1.0)
+    bmesh.ops.create_icosphere(shape, subdivisions=subdivisions, radius=1.0)
     shape.to_mesh(mesh)
     shape.free()
     mesh.shade_smooth()

@@ -2,9 +2,11 @@
 
 import bpy
 
-from . import preview
+from . import export, library, preview
+from .export import LOBEFIT_OT_export_measured
 from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .import_measured import LOBEFIT_FH_measured, LOBEFIT_OT_import_measured, draw_menu
+from .library import LOBEFIT_OT_add_asset_library, LOBEFIT_OT_make_library
 from .run import current
 from .simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 
@@ -15,6 +17,17 @@ _CLASSES = (
     LOBEFIT_OT_cancel_fit,
     LOBEFIT_OT_simplify_scene,
     LOBEFIT_OT_restore_scene,
+    LOBEFIT_OT_make_library,
+    LOBEFIT_OT_add_asset_library,
+    LOBEFIT_OT_export_measured,
+)
+
+# What the operators add to menus of Blender's.
+_ENTRIES = (
+    ("TOPBAR_MT_file_import", draw_menu),
+    ("TOPBAR_MT_file_import", library.draw_import_menu),
+    ("TOPBAR_MT_file_export", export.draw_menu),
+    ("ASSETBROWSER_MT_catalog", library.draw_catalog_menu),
 )
 
 
@@ -22,14 +35,16 @@ def register() -> None:
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     preview.register()
-    bpy.types.TOPBAR_MT_file_import.append(draw_menu)
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).append(entry)
 
 
 def unregister() -> None:
     # Blender does not call an operator's `cancel` when its class goes.
     if current():
         current().end()
-    bpy.types.TOPBAR_MT_file_import.remove(draw_menu)
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).remove(entry)
     preview.unregister()
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

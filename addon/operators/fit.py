@@ -1,12 +1,15 @@
 """Fits the active material anew, and cancels a fit."""
 
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import bpy
+from bpy.props import StringProperty
 
 from ..jobs import Outcome
 from ..nodes.material import fill_material
 from ..records import active_material, record_of
+from .import_measured import MEASURED_GLOB
 from .run import RunsFits, current
 
 
@@ -16,6 +19,14 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
     bl_idname = "lobefit.fit"
     bl_label = "Fit Measured BRDF"
     bl_options: ClassVar = {"REGISTER"}
+
+    filepath: StringProperty(
+        name="File",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+        description="The measured file; if empty, the one of the record",
+    )
+    filter_glob: StringProperty(default=MEASURED_GLOB, options={"HIDDEN"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -29,11 +40,17 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         return super().poll(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self.execute(context)
+        """Asks for the measured file where it is not found."""
+        path = _measured_file(record_of(active_material(context))["source"])
+        if self.filepath or (path and Path(path).is_file()):
+            return self.execute(context)
+        self.filepath = Path(path).name if path else ""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         material = active_material(context)
-        path = record_of(material)["source"]["path"]
+        path = bpy.path.abspath(self.filepath) or _measured_file(record_of(material)["source"])
         if not path:
             return self.refuse(f"{material.name}: its record names no file to fit.")
         self._material_uid = material.session_uid
@@ -45,6 +62,13 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
             return "The material was removed while its fit was under way."
         fill_material(found[0], done[0].record, **self.material_options())
         return ""
+
+
+def _measured_file(source: dict[str, Any]) -> str:
+    """Where the file of a record is; that of an asset, which has no folder, beside the .blend."""
+    path = source["path"] or ""
+    beside = bpy.path.abspath(f"//{Path(path).name}") if bpy.data.filepath else ""
+    return beside if Path(beside).is_file() and not Path(path).is_file() else path
 
 
 class LOBEFIT_OT_cancel_fit(bpy.types.Operator):

@@ -12,8 +12,34 @@ from ..nodes.material import build_material
 from ..properties import draw_fit_options
 from .run import RunsFits
 
+MEASURED_SUFFIXES = (".binary", ".bsdf")
+MEASURED_GLOB = ";".join(f"*{suffix}" for suffix in MEASURED_SUFFIXES)
 
-class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
+
+class ChoosesFiles(ImportHelper):
+    """What operators have in common that ask for several files of a folder."""
+
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Asks for files, unless they were dropped."""
+        if self.directory:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def chosen(self) -> list[Path]:
+        """The files that were chosen; none where only a folder was."""
+        folder = Path(bpy.path.abspath(self.directory))
+        names = [folder / item.name for item in self.files if item.name]
+        if names or not Path(self.filepath).name:
+            return names
+        return [Path(bpy.path.abspath(self.filepath))]
+
+
+class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
     """Fit measured reflectance files and make a material of each"""
 
     bl_idname = "lobefit.import_measured"
@@ -21,29 +47,18 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ImportHelper):
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
     filename_ext = ".binary"
-    filter_glob: StringProperty(default="*.binary;*.bsdf", options={"HIDDEN"})
-    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
-    )
+    filter_glob: StringProperty(default=MEASURED_GLOB, options={"HIDDEN"})
     assign: BoolProperty(
         name="Assign to Object",
         default=True,
         description="Put the first material into the active object's active slot",
     )
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Asks for files, unless they were dropped."""
-        if self.directory and self.files:
-            return self.execute(context)
-        return ImportHelper.invoke(self, context, event)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
-        names = [item.name for item in self.files if item.name]
-        paths = [str(Path(self.directory) / name) for name in names] or [self.filepath]
-        if not Path(paths[0]).name:
+        paths = self.chosen()
+        if not paths:
             return self.refuse("Expected at least one measured file, found none chosen.")
-        return self.fit(context, [bpy.path.abspath(path) for path in paths])
+        return self.fit(context, list(map(str, paths)))
 
     def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
         options = self.material_options()
@@ -68,7 +83,7 @@ class LOBEFIT_FH_measured(bpy.types.FileHandler):
     bl_idname = "LOBEFIT_FH_measured"
     bl_label = "Measured BRDF"
     bl_import_operator = LOBEFIT_OT_import_measured.bl_idname
-    bl_file_extensions = ".binary;.bsdf"
+    bl_file_extensions = ";".join(MEASURED_SUFFIXES)
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:

@@ -345,16 +345,20 @@ Reflectance previewed(const py::object& source) {
   throw InputError("preview: expected 'live', 'principled' or 'closures', found '" + kind + "'.");
 }
 
-py::array_t<float> preview(const py::object& source, int size) {
+py::array_t<float> preview(const py::object& source, int size, double world) {
   if (size < 1 || size > 8192) {
     throw InputError("preview: expected a size of 1 to 8192 pixels, found " + std::to_string(size) +
                      ".");
+  }
+  if (!(world >= 0 && world <= 1e6)) {
+    throw InputError("preview: expected a world of radiance 0 to 1e6, found " +
+                     std::to_string(world) + ".");
   }
   const Reflectance reflectance = previewed(source);
   std::vector<float> pixels;
   {
     const py::gil_scoped_release release;
-    pixels = render_two_lights(reflectance, size);
+    pixels = render_two_lights(reflectance, size, world);
   }
   return py::array_t<float>({size, size, 3}, pixels.data());
 }
@@ -708,10 +712,11 @@ void bind_functions(py::module_& module) {
       },
       py::arg("closures"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of an entry of a record's closures as Cycles renders it, (N, 3).");
-  module.def("preview", &preview, py::arg("source"), py::arg("size"),
-             "The sphere under two lights, (size, size, 3) linear, row 0 at the top. source: a "
-             "Measurement, a dict of parameters, ('live', parameters), ('principled', its dict) or "
-             "('closures', an entry of a record's closures).");
+  module.def("preview", &preview, py::arg("source"), py::arg("size"), py::arg("world") = 0.0,
+             "The sphere under two lights and a world of the radiance `world` (0 to 1e6), "
+             "(size, size, 3) linear, row 0 at the top. source: a Measurement, a dict of "
+             "parameters, ('live', parameters), ('principled', its dict) or ('closures', an entry "
+             "of a record's closures).");
 }
 
 }  // namespace

@@ -10,9 +10,12 @@ import lobefit.preview
 import pytest
 
 OPERATORS = [
+    "add_asset_library",
     "cancel_fit",
+    "export_measured",
     "fit",
     "import_measured",
+    "make_library",
     "preview",
     "restore_scene",
     "simplify_scene",
@@ -81,7 +84,9 @@ def native(addon):
 
 def test_registering_again_leaves_nothing(addon):
     def ours():
-        drawn = (bpy.types.TOPBAR_MT_file_import, bpy.types.STATUSBAR_HT_header)
+        names = ("MT_file_import", "MT_file_export")
+        drawn = [getattr(bpy.types, f"TOPBAR_{name}") for name in names]
+        drawn += [bpy.types.STATUSBAR_HT_header, bpy.types.ASSETBROWSER_MT_catalog]
         functions = [f.__module__ for menu in drawn for f in menu.draw._draw_funcs]
         types = [name for name in dir(bpy.types) if name.startswith("LOBEFIT_")]
         return types, [name for name in functions if name.startswith(addon.__name__)]

@@ -67,6 +67,34 @@ TEST(TwoLights, IsBlackOffTheSphereAndWhereNothingIsKnown) {
                           [](float value) { return std::isfinite(value); }));
 }
 
+TEST(TwoLights, AddsTheLightOfAWorldByTheAlbedo) {
+  const auto diffuse = [](const Vector3& wi, const Vector3&) -> Rgb {
+    return Rgb(1, 0.5, 0.25) * wi.z() / pi;
+  };
+  const auto dark = render_two_lights(diffuse, size), lit = render_two_lights(diffuse, size, 0.3);
+  for (const auto& [row, column] : {std::pair(32, 32), {10, 50}, {55, 10}, {20, 8}}) {
+    const Rgb added = pixel(lit, row, column) - pixel(dark, row, column);
+    // The midpoint rule over half vectors is a thousandth off for a lobe as wide as this.
+    EXPECT_TRUE(added.isApprox(0.3 * Rgb(1, 0.5, 0.25), 3e-3)) << added.transpose();
+  }
+  EXPECT_TRUE((pixel(lit, 0, 0) == 0).all()) << "the world itself is not shown";
+}
+
+// The albedo of f cos = g(wo.z) wi.z is pi g(wo.z), so that a steep g tells whether every view
+// angle gets its own.
+TEST(TwoLights, AddsTheAlbedoOfEachViewAngle) {
+  const auto steep = [](const Vector3& wi, const Vector3& wo) -> Rgb {
+    return Rgb::Constant(std::pow(1 - wo.z(), 5) * wi.z() / pi);
+  };
+  const auto dark = render_two_lights(steep, size), lit = render_two_lights(steep, size, 1);
+  for (const auto& [row, column] : {std::pair(32, 32), {32, 60}, {5, 32}, {32, 64}}) {
+    const double expected = std::pow(1 - normal(row, column).z(), 5);
+    const double added = pixel(lit, row, column)[0] - pixel(dark, row, column)[0];
+    // Linear between 48 steps of the root of the cosine, and the midpoint rule near the horizon.
+    EXPECT_NEAR(added, expected, 0.01) << row << ' ' << column;
+  }
+}
+
 TEST(TwoLights, PassesOnWhatTheReflectanceThrows) {
   EXPECT_THROW(render_two_lights([](const Vector3&, const Vector3&)
                                      -> Rgb { throw std::runtime_error("no such direction"); },

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import refuse
 from lobefit import Record
 from lobefit.command_line import main
 
@@ -54,17 +55,6 @@ BAD_FILES = {
     "all NaN": (lambda path: write_table(path, fill=np.nan), "not finite"),
     "missing": (lambda path: path, "no such file"),
 }
-
-
-def refuse(capfd, *arguments) -> str:
-    """Runs a command that has to end with 2, and returns its only line on stderr."""
-    assert main([str(argument) for argument in arguments]) == 2
-    out, err = capfd.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1, err
-    assert err.startswith("lobefit: ")
-    assert "Traceback" not in err
-    return err
 
 
 @pytest.mark.parametrize("kind", BAD_FILES)

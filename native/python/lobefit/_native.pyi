@@ -102,5 +102,7 @@ def evaluate_closures(
     closures: dict[str, Any], wi: ArrayLike, wo: ArrayLike
 ) -> NDArray[np.float64]: ...
 def preview(
-    source: Measurement | dict[str, Any] | tuple[str, dict[str, Any]], size: int
+    source: Measurement | dict[str, Any] | tuple[str, dict[str, Any]],
+    size: int,
+    world: float = 0.0,
 ) -> NDArray[np.float32]: ...

@@ -67,14 +67,21 @@ class Task:
 def tasks_in(
     folder: Path, sources: Iterable[Path], closures: Sequence[Closures], options: dict[str, Any]
 ) -> list[Task]:
-    """A task for every source, whose record takes the source's name in `folder`.
+    """A task for every source, whose record takes the source's name in `folder`."""
+    places = ((source, folder / f"{source.stem}{RECORD_SUFFIX}") for source in sources)
+    return tasks_at(places, closures, options)
 
-    A record in `folder` that another source's will replace is no source. Raises InputError where
-    two sources have one name.
+
+def tasks_at(
+    places: Iterable[tuple[Path, Path]], closures: Sequence[Closures], options: dict[str, Any]
+) -> list[Task]:
+    """A task for every source and the place of its record.
+
+    A record at a place that another source's will take is no source. Raises InputError where two
+    sources have one place.
     """
     tasks: dict[Path, Task] = {}
-    for source in sources:
-        place = folder / f"{source.stem}{RECORD_SUFFIX}"
+    for source, place in places:
         if place not in tasks:
             tasks[place] = Task(source, place, closures, options)
         elif os.path.realpath(source) != os.path.realpath(place):

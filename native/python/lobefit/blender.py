@@ -1,9 +1,10 @@
 """The few calls that need Blender; nothing of it is imported before one of them is made."""
 
+import dataclasses
 import importlib.util
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lobefit import preview
 from lobefit._native import InputError
-from lobefit.atomic import written_aside
+from lobefit.atomic import place_to_write, written_aside
+from lobefit.catalogues import Catalogues
 from lobefit.fitting import TOLERANCE
 from lobefit.inputs import Progress
+from lobefit.library import Asset
 from lobefit.record import Record
 
 KINDS = ("measured", "lobe", "live", "principled", "auto")
@@ -58,8 +62,60 @@ def write_blend(
     `kind`, `count` and `tolerance` are those of `lobefit_addon.build_material`. Returns what Cycles
     shows, in a few words, and the part of the light that is off.
     """
-    _two_lights_scene([record], 512, kind, count=count, tolerance=tolerance)
+    _two_lights_scene(record, 512, kind, count=count, tolerance=tolerance)
     _save(path)
+    return shown(record, kind, count, tolerance)
+
+
+def write_library(
+    path: str | os.PathLike[str],
+    contents: Sequence[tuple[Record, Asset]],
+    kind: str = "measured",
+    count: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Writes a Blender file whose materials are assets, and their catalogues beside it.
+
+    Each material carries its record, with the name of the measured file but not its folder. `kind`
+    and `count` are those of `lobefit_addon.build_material`. The file is opened again before it gets
+    its name. Returns the number of `materials`, their `catalogues`, the `catalogue_file`, and in
+    `opens_in` the oldest Blender that opens the library. Raises InputError where it cannot be
+    written.
+    """
+    catalogues = Catalogues(place_to_write(path).parent)
+    import bpy
+    from lobefit_addon.assets import missing_assets, oldest_release
+    from lobefit_addon.records import KEY
+
+    with quiet():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    made = []
+    for index, (record, asset) in enumerate(contents):
+        if progress:
+            progress(index / len(contents), record.name)
+        material = _asset(_portable(record), asset, catalogues, kind, count)
+        made.append((material.name, material[KEY]))
+    if progress:
+        progress(1.0, "writing")
+    with written_aside(path) as aside:
+        _save_as(aside, path)
+        _open(aside)
+        missing = missing_assets(made)
+        if missing:
+            raise InputError(f"{path}: expected {missing[0]} in what was written, found it lost.")
+        catalogues.save()
+    return {
+        "materials": len(made),
+        "catalogues": sorted({asset.catalogue for _, asset in contents}),
+        "catalogue_file": str(catalogues.path),
+        "opens_in": oldest_release(),
+    }
+
+
+def shown(
+    record: Record, kind: str, count: int | None = None, tolerance: float = TOLERANCE
+) -> tuple[str, float]:
+    """What Cycles shows of a record, in a few words, and the part of the light that is off."""
     from lobefit_addon.nodes.material import choose
 
     choice = choose(record, kind, count, tolerance)
@@ -67,17 +123,11 @@ def write_blend(
     return choice.kind + closures, choice.error(record)
 
 
-def write_library(path: str | os.PathLike[str], records: list[Record], kind: str = "live") -> None:
-    """Writes a Blender file with the materials of all records, the first of them on a sphere."""
-    _two_lights_scene(records, 512, kind)
-    _save(path)
-
-
 def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]:
     """The radiance (size, size, 3) that Cycles gives a record's material under the two lights."""
     from lobefit_addon.scene import render_pixels
 
-    scene = _two_lights_scene([record], size, kind)
+    scene = _two_lights_scene(record, size, kind)
     with quiet():
         pixels: NDArray[np.float32] = render_pixels(scene)
     return pixels
@@ -103,6 +153,55 @@ def costs(record: Record) -> dict[tuple[str, int | None], float]:
             materials[kind, count] = build_material(record, kind=kind, count=count)
         measured = measure_costs(materials, "world", rounds=5, samples=16)
     return {way: cost.seconds for way, cost in measured.items()}
+
+
+def records_in(path: str | os.PathLike[str]) -> dict[str, str]:
+    """The records, in JSON, of the materials of a Blender file, by the names of the materials."""
+    _open(path)
+    import bpy
+    from lobefit_addon.records import KEY
+
+    return {item.name_full: str(item[KEY]) for item in bpy.data.materials if KEY in item}
+
+
+def export_principled(path: str | os.PathLike[str], name: str, record: Record) -> None:
+    """Writes a sphere of a record's Principled BSDF, by Blender's exporter of glTF or of USD.
+
+    The suffix of `path` tells which, .glb or .usdc; `name` is that of the material.
+    """
+    import bpy
+    from lobefit_addon import build_material
+    from lobefit_addon.scene import sphere_mesh
+
+    with quiet():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        mesh = sphere_mesh(build_material(record, "principled", name), subdivisions=5)
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+    with written_aside(path) as aside, quiet():
+        export = bpy.ops.wm.usd_export
+        if aside.suffix == ".glb":
+            export = bpy.ops.export_scene.gltf
+        try:
+            export(filepath=str(aside.absolute()))
+        except AttributeError as error:
+            reason = "this Blender was built without an exporter for it"
+            raise InputError(f"{path}: cannot be written, {reason}.") from error
+        except RuntimeError as error:
+            raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
+
+
+def leave_after_gltf(code: int) -> int:
+    """The exit code, for a program that ends now; it does not return where the end would crash.
+
+    The bpy 4.2 wheel does, after its exporter of glTF has run.
+    """
+    import bpy
+
+    if bpy.app.version < (4, 3) and not is_this_program():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
 
 
 def simplify(
@@ -172,28 +271,64 @@ def _one_line(error: RuntimeError) -> str:
     return " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
 
 
-def _two_lights_scene(records: list[Record], size: int, kind: str, **options: Any) -> Any:
-    """An otherwise empty Blender with the materials; the scene shows the first, `size` pixels."""
+def _two_lights_scene(record: Record, size: int, kind: str, **options: Any) -> Any:
+    """An otherwise empty Blender whose scene shows the material, `size` pixels wide."""
     import bpy
     from lobefit_addon import build_material
     from lobefit_addon.scene import two_lights_scene
 
     with quiet():
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        materials = [build_material(record, kind, record.name, **options) for record in records]
-        for material in materials:
-            material.use_fake_user = True
-        return two_lights_scene(materials[0], size)
+        material = build_material(record, kind, record.name, **options)
+        material.use_fake_user = True
+        return two_lights_scene(material, size)
+
+
+def _asset(
+    record: Record, asset: Asset, catalogues: Catalogues, kind: str, count: int | None
+) -> Any:
+    """A new material that is an asset, with its picture."""
+    from lobefit_addon import build_material
+    from lobefit_addon.assets import mark_asset, set_picture
+    from lobefit_addon.nodes.material import choose
+
+    material = build_material(record, kind, asset.name or record.name, count)
+    what, error = shown(record, kind, count)
+    told = [f"{what}, {error:.1%} of the reflected light is off"]
+    told += [f"Measured in {record.source['path']}"] if record.source["path"] else []
+    told += [f"Source: {asset.source}"] if asset.source else []
+    mark_asset(material, asset, catalogues.identifier(asset.catalogue), ". ".join(told))
+    set_picture(material, preview.thumbnail(choose(record, kind, count).shown(record)))
+    return material
+
+
+def _portable(record: Record) -> Record:
+    """The record with the name of its measured file, which may be shared, but not its folder."""
+    path = record.source["path"]
+    source = record.source | {"path": Path(path).name if path else None}
+    return dataclasses.replace(record, source=source)
 
 
 def _save(path: str | os.PathLike[str]) -> None:
+    with written_aside(path) as aside:
+        _save_as(aside, path)
+
+
+def _save_as(aside: Path, path: str | os.PathLike[str]) -> None:
+    """Saves to `aside`; what goes wrong is told of `path`."""
     import bpy
 
-    with written_aside(path) as aside, quiet():
+    with quiet():
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(aside.absolute()), copy=True, compress=True)
         except RuntimeError as error:
-            raise InputError(f"{path}: cannot be written, {str(error).strip()}.") from error
+            raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
+        try:
+            # Blender does not tell when the disk is full at the last of its blocks.
+            with bpy.data.libraries.load(str(aside.absolute())):
+                pass
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written, its end is missing.") from error
 
 
 @contextmanager

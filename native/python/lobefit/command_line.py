@@ -8,17 +8,28 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from lobefit import _native, blender, methods, picture, pictures, preview, report, simplified
+from lobefit import (
+    _native,
+    blender,
+    export,
+    methods,
+    picture,
+    pictures,
+    preview,
+    report,
+    simplified,
+)
 from lobefit._native import Cancelled, InputError
-from lobefit.atomic import make_folder, place_to_write
-from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_in
+from lobefit.atomic import make_folder, place_to_write, write_bytes
+from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
     MEASUREMENT_SUFFIXES,
@@ -27,14 +38,18 @@ from lobefit.inputs import (
     record_of,
     spread,
 )
+from lobefit.library import items_of, records_folder
 from lobefit.origin import origin_of, write_samples
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
 _BAR = 24  # characters
+_LINE_PAUSE = 0.2  # seconds between two lines that tell how far we are
+_WRITING = 0.1  # the share of a library's time that its pictures and its file take
 
 Item = TypeVar("Item")
+Bar = Callable[[str], AbstractContextManager[Progress | None]]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -96,6 +111,31 @@ def progress_bar(name: str) -> Iterator[Progress | None]:
         sys.stderr.flush()
 
 
+@contextmanager
+def progress_lines(name: str) -> Iterator[Progress]:
+    """Lines of JSON on stdout while the block runs, for a program that shows how far we are."""
+    last = 0.0
+
+    def show(share: float, stage: str) -> None:
+        nonlocal last
+        if share == 1.0 or time.monotonic() > last + _LINE_PAUSE:
+            last = time.monotonic()
+            print(json.dumps({"progress": share, "text": stage or name}), flush=True)
+
+    yield show
+
+
+def part_of(bar: Bar, start: float, end: float) -> Bar:
+    """A bar whose shares from 0 to 1 are those from `start` to `end` of `bar`."""
+
+    @contextmanager
+    def part(name: str) -> Iterator[Progress | None]:
+        with bar(name) as progress:
+            yield progress and (lambda share, stage: progress(start + share * (end - start), stage))
+
+    return part
+
+
 class _FitOption(argparse.Action):
     """Stores a value, or the constant of a flag, and that it was given: a record needs no fit."""
 
@@ -128,6 +168,8 @@ def _parser() -> argparse.ArgumentParser:
         _add_closures,
         _add_preview,
         _add_material,
+        _add_library,
+        _add_export,
         _add_simplify,
         _add_report,
     ):
@@ -181,16 +223,20 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
         "-o", dest="output", required=True, help="RECORD.json, or a folder for several files"
     )
     command.add_argument(
-        "--again",
-        action="store_true",
-        help="also what a folder already holds, of the same settings",
-    )
-    command.add_argument(
         "--uncertainty",
         action=_FitOption,
         nargs=0,
         const=True,
         help="also how well the data determine the parameters (up to 3 more times as long)",
+    )
+    _add_batch_options(command)
+
+
+def _add_batch_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--again",
+        action="store_true",
+        help="also what is there already, of the same settings",
     )
     where = command.add_mutually_exclusive_group()
     where.add_argument(
@@ -209,7 +255,8 @@ def _add_record_output(command: argparse.ArgumentParser) -> None:
     _add_json(command)
 
 
-def _add_closure_options(command: argparse.ArgumentParser) -> None:
+def _add_closure_options(command: argparse.ArgumentParser, tolerance: bool = True) -> None:
+    command.set_defaults(tolerance=None)
     group = command.add_argument_group("closures")
     number = group.add_mutually_exclusive_group()
     number.add_argument(
@@ -219,12 +266,13 @@ def _add_closure_options(command: argparse.ArgumentParser) -> None:
         metavar="N",
         help="specular closures besides the diffuse one; " + _DEFAULT,
     )
-    number.add_argument(
-        "--tolerance",
-        type=_within(float, 0, 1, "a part of the light"),
-        metavar="E",
-        help="take as few as keep the error of spheres to this part of the light, 0.05 is 5 %%",
-    )
+    if tolerance:
+        number.add_argument(
+            "--tolerance",
+            type=_within(float, 0, 1, "a part of the light"),
+            metavar="E",
+            help="take as few as keep the error of spheres to this part of the light, 0.05 is 5 %%",
+        )
     group.add_argument(
         "--cap-albedo", action="store_true", help="keep the albedo at 1 where a measurement is over"
     )
@@ -278,6 +326,44 @@ def _add_material(commands: Any) -> None:
     _add_closure_options(command)
     _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
     command.add_argument("-o", dest="output", required=True, metavar="OUT.blend")
+
+
+def _add_library(commands: Any) -> None:
+    command = _add(
+        commands, _library, "make an asset library of measured files or records (needs bpy)"
+    )
+    command.add_argument(
+        "files",
+        metavar="DIR|FILE|RECORD.json",
+        nargs="+",
+        help="of a folder all in and below it; materials.csv beside the files tells their name, "
+        "catalogue, tags, author, licence and source",
+    )
+    # `auto` judges by a tolerance, and a record does not tell whether it was made for the same.
+    kinds = [kind for kind in blender.KINDS if kind != "auto"]
+    command.add_argument("--kind", choices=kinds, default="measured", help=_DEFAULT)
+    _add_closure_options(command, tolerance=False)
+    _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
+    command.add_argument(
+        "-o",
+        dest="output",
+        required=True,
+        metavar="OUT.blend",
+        help="its records stay in OUT.records beside it, so that it goes on where it stopped",
+    )
+    _add_batch_options(command)
+
+
+def _add_export(commands: Any) -> None:
+    command = _add(
+        commands, _export, "write what the measured materials of a Blender file hold (needs bpy)"
+    )
+    command.add_argument("file", metavar="FILE.blend")
+    group = command.add_argument_group("what to write; without any of them, all")
+    for kind, text in export.KINDS.items():
+        group.add_argument(f"--{kind}", dest="kinds", action="append_const", const=kind, help=text)
+    command.add_argument("-o", dest="output", required=True, metavar="DIR")
+    _add_json(command)
 
 
 def _add_simplify(commands: Any) -> None:
@@ -450,26 +536,41 @@ def _write_records(
     one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
     paths = spread(options.files, suffixes)
     _refuse_idle_options(options, paths)
-    way = on_cluster(options.scheduler) if options.scheduler else in_processes(options.jobs)
     if one:
         tasks = [Task(paths[0], output, closures, fitted)]
     else:
         tasks = tasks_in(make_folder(output), paths, closures, fitted)
 
-    def show(ended: Ended) -> None:
-        task, record = ended
-        if isinstance(record, InputError):
-            raise record
+    def show(task: Task, record: Record) -> None:
         if options.json:
             print(json.dumps({"record": str(task.place)} | json.loads(record.to_json())))
         else:
             tell(record, task.place)
 
     # A folder that was interrupted goes on where it stopped.
-    batch = Batch(tasks, way, keep=not one and not options.again, bar=progress_bar)
+    return _run(options, tasks, not one and not options.again, show, progress_bar)
+
+
+def _run(
+    options: argparse.Namespace,
+    tasks: Sequence[Task],
+    keep: bool,
+    show: Callable[[Task, Record], None],
+    bar: Bar,
+) -> int:
+    """Computes the record of every task, shows those that end well, and tells of the others."""
+    way = on_cluster(options.scheduler) if options.scheduler else in_processes(options.jobs)
+
+    def show_ended(ended: Ended) -> None:
+        task, record = ended
+        if isinstance(record, InputError):
+            raise record
+        show(task, record)
+
+    batch = Batch(tasks, way, keep=keep, bar=bar)
     with closing(batch.run()) as ended:
-        code = for_each(ended, show)
-    if batch.kept:
+        code = for_each(ended, show_ended)
+    if batch.kept and not options.json:
         kept = f"{batch.kept} of {len(tasks)} kept from before (--again computes them anew)"
         print(f"lobefit: {kept}", file=sys.stderr)
     return code
@@ -554,6 +655,71 @@ def _material(options: argparse.Namespace) -> int:
     if options.kind == "auto" and error > tolerance:
         print(f"   none keeps to {tolerance:g}: this is the nearest")
     return DONE
+
+
+def _library(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    if place_to_write(options.output).suffix.lower() != ".blend":
+        raise InputError(f"{options.output}: expected a name that ends in .blend.")
+    items = items_of(options.files, records_folder(options.output))
+    _refuse_idle_options(options, [item.file for item in items])
+    requests = closures_for(options.kind, options.closures, cap_albedo=options.cap_albedo)
+    count = options.closures if options.kind in TARGETS else None
+    places = [(item.file, item.place) for item in items]
+    tasks = tasks_at(places, requests, _fit_options(options))
+    for task in tasks:
+        make_folder(task.place.parent)
+    records: dict[Path, Record] = {}
+
+    def show(task: Task, record: Record) -> None:
+        records[task.place] = record
+        what, error = blender.shown(record, options.kind, count)
+        if options.json:
+            told = {"file": str(task.source), "name": record.name, "shown": what, "error": error}
+            print(json.dumps(told), flush=True)
+        else:
+            print(f"{task.source}: {record.name}, {what}, {error:.1%} of the light is off")
+
+    bar = progress_lines if options.json else progress_bar
+    code = _run(options, tasks, not options.again, show, part_of(bar, 0.0, 1 - _WRITING))
+    contents = [(records[item.place], item.asset) for item in items if item.place in records]
+    if contents:
+        with part_of(bar, 1 - _WRITING, 1.0)(Path(options.output).name) as progress:
+            result = blender.write_library(options.output, contents, options.kind, count, progress)
+        _tell_of_library(options.output, result, options.json)
+    return code
+
+
+def _tell_of_library(path: str, result: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"library": path} | result), flush=True)
+        return
+    told = f"{result['materials']} materials in {', '.join(result['catalogues'])}"
+    print(f"{path}: {told}; opens in Blender {result['opens_in']} and later")
+
+
+def _export(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    texts = blender.records_in(options.file)
+    if not texts:
+        raise InputError(f"{options.file}: expected a measured material, found none.")
+    folder, kinds = make_folder(options.output), options.kinds or export.KINDS
+    records: dict[str, Record] = {}
+
+    def tell(path: Path) -> None:
+        print(json.dumps({"path": str(path)}) if options.json else path)
+
+    def write(named: tuple[str, Path]) -> None:
+        name, stem = named
+        record = records[name] = Record.from_json(texts[name], f"{options.file}, {name}")
+        for path in export.write_material(record, name, stem, kinds):
+            tell(path)
+
+    code = for_each(export.places_in(folder, texts), write)
+    if records and "csv" in kinds:
+        write_bytes(folder / export.TABLE, export.table(records).encode())
+        tell(folder / export.TABLE)
+    return blender.leave_after_gltf(code) if "gltf" in kinds else code
 
 
 def _simplify(options: argparse.Namespace) -> int:

@@ -18,6 +18,7 @@ from lobefit.atomic import make_folder
 from lobefit.command_line import DONE, INTERRUPTED, SOME_FAILED, WRONG, progress_bar
 from lobefit.fitting import Closures, read
 from lobefit.inputs import MEASUREMENT_SUFFIXES, record_of, spread
+from lobefit.library import Asset
 from lobefit.origin import write_samples
 from lobefit.record import VISUAL_NORM, Record, figure_of
 
@@ -73,7 +74,8 @@ class _Demo:
         )
         built = [record for record in self.records if record.name in self.renderings]
         if built:
-            blender.write_library(self.folder / "materials.blend", built, KIND)
+            contents = [(record, Asset()) for record in built]
+            blender.write_library(self.folder / "materials.blend", contents, KIND)
 
     def attempt(self, what: str, work: Callable[[], None]) -> bool:
         """Does the work and says whether it succeeded; a failure is named and remembered."""

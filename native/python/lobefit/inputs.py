@@ -1,5 +1,6 @@
 """What stands on a command line for materials: measurements, records, and folders of either."""
 
+import dataclasses
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -63,21 +64,37 @@ def kept_record(
 ) -> Record | None:
     """The record at `place` if the same build made it of the same file with the same options.
 
-    `options` are those of `Job`. None for what has to be computed, and where `path` is a record.
+    `options` are those of `Job`. Where `path` is a record itself, the one at `place` is it with
+    closures added. None for what has to be computed.
     """
-    if path.suffix.lower() == RECORD_SUFFIX or not place.is_file():
+    if not place.is_file():
         return None
     try:
         record = Record.load(place)
-        same = (
-            record.machine.get("build") == build_id
-            and list(record.fits)
-            == (list(MODELS) if options["model"] == "all" else [options["model"]])
-            and (record.parameters["ior"] is not None) == options["fresnel"]
-            and all(getattr(record, name) == options[name] for name in _KEPT_OPTIONS)
-            and (record.uncertainty is not None or not options.get("uncertainty"))
-            and all(request.is_in(record) for request in closures)
-        )
-        return record if same and origin_of(path).sha256 == record.source["sha256"] else None
+        if path.suffix.lower() == RECORD_SUFFIX:
+            same = _is_extended(record, Record.load(path))
+        else:
+            same = _has_options(record, options) and (
+                origin_of(path).sha256 == record.source["sha256"]
+            )
+        return record if same and all(request.is_in(record) for request in closures) else None
     except InputError:
         return None
+
+
+def _is_extended(record: Record, base: Record) -> bool:
+    """Whether a record is `base`, but for closures that it has beside those of `base`."""
+    same = dataclasses.replace(record, closures=base.closures) == base
+    return same and all(entry in record.closures for entry in base.closures)
+
+
+def _has_options(record: Record, options: dict[str, Any]) -> bool:
+    """Whether this build made the record with these options of a fit."""
+    models = list(MODELS) if options["model"] == "all" else [options["model"]]
+    return (
+        record.machine.get("build") == build_id
+        and list(record.fits) == models
+        and (record.parameters["ior"] is not None) == options["fresnel"]
+        and all(getattr(record, name) == options[name] for name in _KEPT_OPTIONS)
+        and (record.uncertainty is not None or not options.get("uncertainty"))
+    )

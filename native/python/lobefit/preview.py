@@ -14,6 +14,7 @@ from lobefit.record import Record
 
 AMPLIFIED = 4
 SPHERE = 180  # pixels a sphere, if nothing else is asked for
+THUMBNAIL = 256  # pixels of an asset's picture, as Blender shows it
 FINER = 3  # spheres are drawn this many times finer and then shrunk
 TITLES = {
     "measured": "measured",
@@ -29,6 +30,9 @@ FIGURES = {"relative_l1": "relative L1", "relative_l1_cosine": "cosine-weighted 
 _PAPER = (0.115, 0.115, 0.125)
 _INK = (0.95, 0.95, 0.95)
 _FAINT = (0.62, 0.63, 0.66)
+# The radiance of the world of a thumbnail: three tenths of what a white diffuse surface that faces
+# one of the lights has.
+WORLD = 0.3 / np.pi
 _MARGIN, _GAP, _CAPTION, _HEADER = 28, 18, 30, 56
 _TEXT, _SMALL = 17.0, 15.0
 
@@ -92,6 +96,29 @@ def row(
             for column, image in linear.items()
         },
     )
+
+
+def thumbnail(shown: tuple[str, dict[str, Any]], size: int = THUMBNAIL) -> NDArray[np.float32]:
+    """The sphere of an asset, sRGB with the share of the pixel it covers: (size, size, 4).
+
+    `shown` is what Cycles shows, as `_native.preview` takes it. A faint white world around the two
+    lights makes polished and dark materials seen. The exposure goes with the root of the mean light
+    of a sphere: what is darker looks darker, but nothing looks black.
+    """
+    finer = 2  # is enough for one sphere; the next step would double the time
+    linear = _native.preview(shown, size * finer, world=WORLD)
+    place = (np.arange(size * finer) + 0.5) * 2 / (size * finer) - 1
+    inside = (np.hypot(place, place[:, None]) < 1).astype(np.float32)[..., None]
+    cover, light = (picture.shrink(image, finer) for image in (inside, exposed(linear)))
+    return np.concatenate([picture.encode(light / cover.clip(1e-6)), cover], axis=2)
+
+
+def exposed(linear: Image) -> Image:
+    """The light of a thumbnail's sphere, (size, size, 3) and black around it, between 0 and 1."""
+    white = 1 / np.pi + WORLD  # of a white diffuse surface that faces a light
+    sphere = np.pi / 4 * linear.size
+    mean = float(np.minimum(np.nan_to_num(linear), white).sum() / sphere)
+    return picture.expose(linear, (white * mean) ** 0.5)
 
 
 def sheet(rows: list[Row], size: int = SPHERE) -> Image:
