@@ -38,6 +38,7 @@
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
 #include "reflectance/model.h"
+#include "reflectance/phong_energy.h"
 
 namespace py = pybind11;
 
@@ -321,6 +322,25 @@ Reflectance principled_reflectance(const Principled& principled) {
 
 Reflectance closures_reflectance(const ClosureSet& closures) {
   return [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
+}
+
+// A row of value, by_exponent and by_angle for each exponent and angle in degrees, (N) each.
+py::array_t<double> phong_energy_rows(bool modified, const DirectionArray& exponent,
+                                      const DirectionArray& angle) {
+  if (exponent.ndim() != 1 || angle.ndim() != 1 || exponent.size() != angle.size()) {
+    throw InputError("energy: expected as many exponents as angles.");
+  }
+  py::array_t<double> result({exponent.size(), py::ssize_t{3}});
+  auto rows = result.mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < exponent.size(); ++i) {
+    const auto view = ViewAngle<double>::from_degrees(angle.at(i));
+    const double n = exponent.at(i);
+    const auto energy = modified ? modified_phong_energy(n, view) : phong_energy(n, view);
+    rows(i, 0) = energy.value;
+    rows(i, 1) = energy.by_exponent;
+    rows(i, 2) = energy.by_angle;
+  }
+  return result;
 }
 
 Reflectance measured_reflectance(SharedMeasurement measurement) {
@@ -691,6 +711,10 @@ void bind_functions(py::module_& module) {
         return evaluate_rows(model_reflectance(parameters_from(parameters)), wi, wo);
       },
       py::arg("parameters"), py::arg("wi"), py::arg("wo"), "f in 1/sr, (N, 3).");
+  module.def("phong_energy", &phong_energy_rows, py::arg("modified"), py::arg("exponent"),
+             py::arg("angle"),
+             "The integral of Phong's or modified Phong's lobe and its derivatives by exponent and "
+             "angle (per radian), (N, 3), for (N) exponents and angles in degrees.");
   module.def(
       "evaluate_live",
       [](const py::dict& parameters, const DirectionArray& wi, const DirectionArray& wo) {

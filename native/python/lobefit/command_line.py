@@ -40,6 +40,7 @@ from lobefit.inputs import (
 )
 from lobefit.library import items_of, records_folder
 from lobefit.origin import origin_of, write_samples
+from lobefit.phong_energy import LOBES, MOST_EXPONENT, energy
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
@@ -171,6 +172,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_library,
         _add_export,
         _add_simplify,
+        _add_energy,
         _add_report,
     ):
         add(commands)
@@ -398,6 +400,26 @@ def _add_simplify(commands: Any) -> None:
     )
     command.add_argument(
         "-o", dest="output", metavar="OUT.blend", help="without it nothing is written"
+    )
+    _add_json(command)
+
+
+def _add_energy(commands: Any) -> None:
+    command = _add(commands, _energy, "tell how much a Phong lobe reflects, which normalises it")
+    command.add_argument("--model", choices=LOBES, required=True)
+    command.add_argument(
+        "--exponent",
+        type=_within(float, 0, MOST_EXPONENT, "an exponent"),
+        required=True,
+        metavar="N",
+        help="any real one",
+    )
+    command.add_argument(
+        "--angle",
+        type=_within(float, 0, 90, "degrees"),
+        required=True,
+        metavar="DEG",
+        help="between the normal and the viewer",
     )
     _add_json(command)
 
@@ -746,6 +768,23 @@ def _simplify(options: argparse.Namespace) -> int:
     if options.output is None:
         lines.append("nothing is written without -o OUT.blend")
     print(json.dumps(result) if options.json else "\n".join(lines))
+    return DONE
+
+
+def _energy(options: argparse.Namespace) -> int:
+    found = energy(options.model, options.exponent, options.angle)
+    figures = {
+        "energy-conserving factor": found.conserving,
+        "energy-normalised factor": found.normalising,
+        "by exponent": found.by_exponent,
+        "by angle": found.by_angle,
+        "integral": found.integral,
+    }
+    if options.json:
+        print(json.dumps({name.replace(" ", "_"): value for name, value in figures.items()}))
+    else:
+        for name, value in figures.items():
+            print(f"{name:24} {value:.17g}")
     return DONE
 
 
