@@ -343,6 +343,25 @@ py::array_t<double> phong_energy_rows(bool modified, const DirectionArray& expon
   return result;
 }
 
+// Rows of (N, 5) cos theta, exponent, interpolation, ior and fresnel; a row of value and weight
+// each.
+py::array_t<double> live_albedo_rows(const DirectionArray& arguments) {
+  if (arguments.ndim() != 2 || arguments.shape(1) != 5) {
+    throw InputError("arguments: expected an array of shape (N, 5).");
+  }
+  const py::ssize_t count = arguments.shape(0);
+  py::array_t<double> result({count, py::ssize_t{2}});
+  const double* in = arguments.data();
+  double* out = result.mutable_data();
+  const py::gil_scoped_release release;
+  for (py::ssize_t i = 0; i < count; ++i, in += 5, out += 2) {
+    const LiveAlbedo albedo = live_albedo(in[0], in[1], in[2], in[3], in[4]);
+    out[0] = albedo.value;
+    out[1] = albedo.weight;
+  }
+  return result;
+}
+
 Reflectance measured_reflectance(SharedMeasurement measurement) {
   return [measurement = std::move(measurement)](const Vector3& wi, const Vector3& wo) {
     return measurement->evaluate(wi, wo);
@@ -722,6 +741,10 @@ void bind_functions(py::module_& module) {
       },
       py::arg("parameters"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of the live node group as Cycles renders it, (N, 3).");
+  module.def("live_albedo", &live_albedo_rows, py::arg("arguments"),
+             "What the specular closures of the live node group reflect of a white world, and the "
+             "sum of their weights, (N, 2), for k_s = 1 and rows of cos theta, exponent, "
+             "interpolation, ior and fresnel, (N, 5).");
   module.def(
       "evaluate_principled",
       [](const py::dict& principled, const DirectionArray& wi, const DirectionArray& wo) {
