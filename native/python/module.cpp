@@ -6,6 +6,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -35,6 +36,7 @@
 #include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
 #include "measurement/rgl.h"
+#include "preview/phong_terms.h"
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
 #include "reflectance/model.h"
@@ -340,6 +342,33 @@ py::array_t<double> phong_energy_rows(bool modified, const DirectionArray& expon
     rows(i, 1) = energy.by_exponent;
     rows(i, 2) = energy.by_angle;
   }
+  return result;
+}
+
+using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+// Phong's specular term or an alteration of it at normals (3, N).
+py::array_t<float> phong_terms(const std::string& term, double exponent, int gamma,
+                               const std::array<double, 3>& light,
+                               const std::array<double, 3>& viewer, const FloatArray& normals,
+                               bool lanes) {
+  if (normals.ndim() != 2 || normals.shape(0) != 3 || normals.size() == 0) {
+    throw InputError("normals: expected an array of shape (3, N).");
+  }
+  if (gamma != 4 && gamma != 8 && gamma != 16 && gamma != 32) {
+    throw InputError("gamma: expected 4, 8, 16 or 32, found " + std::to_string(gamma) + ".");
+  }
+  const PhongTermInput input{phong_term_named(term),
+                             exponent,
+                             std::countr_zero(static_cast<unsigned>(gamma)),
+                             Vector3(light.data()),
+                             Vector3(viewer.data()),
+                             static_cast<std::size_t>(normals.shape(1)),
+                             {normals.data(0, 0), normals.data(1, 0), normals.data(2, 0)}};
+  py::array_t<float> result(normals.shape(1));
+  float* terms = result.mutable_data();
+  const py::gil_scoped_release release;
+  lanes ? phong_terms_in_lanes(input, terms) : phong_terms_one_by_one(input, terms);
   return result;
 }
 
@@ -741,6 +770,11 @@ void bind_functions(py::module_& module) {
       },
       py::arg("parameters"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of the live node group as Cycles renders it, (N, 3).");
+  module.def("phong_terms", &phong_terms, py::arg("term"), py::arg("exponent"), py::arg("gamma"),
+             py::arg("light"), py::arg("viewer"), py::arg("normals"), py::arg("lanes"),
+             "Phong's specular term ('exact') or an alteration of it ('half-vector', 'dot', "
+             "'difference', 'cross') at normals (3, N), (N), one by one or in lanes; gamma is that "
+             "of the last three.");
   module.def("live_albedo", &live_albedo_rows, py::arg("arguments"),
              "What the specular closures of the live node group reflect of a white world, and the "
              "sum of their weights, (N, 2), for k_s = 1 and rows of cos theta, exponent, "

@@ -18,6 +18,7 @@ from typing import Any, NoReturn, TypeVar
 
 from lobefit import (
     _native,
+    alterations,
     blender,
     export,
     methods,
@@ -798,7 +799,14 @@ def _report(options: argparse.Namespace) -> int:
             ways = {record.name: pictures.measure(record) for record in records}
         trials = {record.name: _trials(record, options.threads) for record in records}
         with progress_bar("report") as progress:
-            report.write(options.output, records, ways=ways, trials=trials, progress=progress)
+            report.write(
+                options.output,
+                records,
+                ways=ways,
+                trials=trials,
+                terms=alterations.measure(),
+                progress=progress,
+            )
         print(Path(options.output) / "index.html")
     return code
 
