@@ -159,7 +159,7 @@ WallisIntegrals<Real> wallis_integrals(Real m, const ViewAngle<Real>& view, Real
 
 }  // namespace detail
 
-// I_P for an exponent n >= 0. Within 1e-13 (double) or 1e-5 (float) of the integral for n of 0 and
+// I_P for an exponent n >= 0. Within 2e-15 (double) or 1e-6 (float) of the integral for n of 0 and
 // 1e-37 to 1e12. It is defined here so that what a caller leaves unused is not computed.
 template <std::floating_point Real>
 PhongEnergy<Real> phong_energy(Real exponent, const ViewAngle<Real>& view) {

@@ -485,8 +485,10 @@ def _term_line(term: str, shown: Sequence[Alteration], way: str) -> Line:
         # It has no error: a line where it stands in time.
         ends = [alterations.STEP, max(each.worst for each in shown)]
         return Line(title, times * 2, ends, color, True)
-    marks = [str(each.gamma or "") for each in found]
-    return Line(title, times, errors, color, dots=marks, marks=marks)
+    gammas = [str(each.gamma or "") for each in found]
+    # The points of the difference stand beside those of the dot product.
+    marks = [] if term == "difference" else gammas
+    return Line(title, times, errors, color, dots=gammas, marks=marks)
 
 
 def _term_plot(lines: Sequence[Line]) -> str:
