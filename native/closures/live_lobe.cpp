@@ -49,16 +49,15 @@ Fresnel fresnel_terms(double tan2, double ior, double fresnel) {
   return {value, slope / 4, (value - facing) / (value + facing)};
 }
 
-// What a closure of weight 1 reflects of a white world toward wo, as Cycles samples it. Half
-// vectors are taken by equal parts of D (n'.wh) d wh, which is a Gaussian of their slopes, so that
-// a narrow closure costs no more than a wide one.
-double white_albedo(const LiveClosure& closure, const Vector3& wo) {
+// Half vectors are taken by equal parts of D (n'.wh) d wh, which is a Gaussian of their slopes, so
+// that a narrow closure costs no more than a wide one.
+LiveAlbedo white_albedo(const LiveClosure& closure, const Vector3& wo) {
   constexpr int rings = 40, sectors = 48;  // within 1e-3
   const Shape shape{std::log(closure.alpha_x), std::log(closure.alpha_y), closure.tilt};
   const Microfacet microfacet(Distribution::beckmann, shape, wo);
   const double shrink = 1 / std::sqrt(1 + square(closure.tilt));
   const Vector3 normal(closure.tilt * shrink, 0, shrink), along(shrink, 0, -closure.tilt * shrink);
-  double sum = 0;
+  double sampled = 0, beyond = 0;
   for (int ring = 0; ring < rings; ++ring) {
     // Rings crowd where slopes are large.
     const double root = 1 - (ring + 0.5) / rings, slope = std::sqrt(-2 * std::log(root));
@@ -69,10 +68,14 @@ double white_albedo(const LiveClosure& closure, const Vector3& wo) {
                            closure.alpha_y * slope * std::sin(phi) * Vector3::UnitY() + normal;
       const double incidence = wo.dot(half);
       const Vector3 wi = 2 * incidence / half.squaredNorm() * half - wo;
-      if (incidence > 0 && wi.z() > 0) sum += 2 * root * incidence * microfacet.visible(wi);
+      if (!(incidence > 0 && wi.z() > 0)) continue;
+      const double part = 2 * root * incidence * microfacet.visible(wi);
+      sampled += part;
+      if (normal.dot(wi) <= 0) beyond += part;
     }
   }
-  return sum / (rings * sectors * normal.dot(wo));
+  const double scale = closure.weight / (rings * sectors * normal.dot(wo));
+  return {sampled * scale, (sampled - beyond) * scale, closure.weight};
 }
 
 }  // namespace
@@ -141,9 +144,8 @@ LiveAlbedo live_albedo(double cos_view, double exponent, double interpolation, d
                        double fresnel) {
   const auto [bent, broad] = live_closures(cos_view, exponent, interpolation, ior, fresnel);
   const Vector3 wo(std::sqrt(1 - square(cos_view)), 0, cos_view);
-  const double value =
-      bent.weight * white_albedo(bent, wo) + broad.weight * white_albedo(broad, wo);
-  return {value, bent.weight + broad.weight};
+  const LiveAlbedo a = white_albedo(bent, wo), b = white_albedo(broad, wo);
+  return {a.until_4_5 + b.until_4_5, a.since_5_0 + b.since_5_0, a.weight + b.weight};
 }
 
 Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo) {

@@ -372,21 +372,21 @@ py::array_t<float> phong_terms(const std::string& term, double exponent, int gam
   return result;
 }
 
-// Rows of (N, 5) cos theta, exponent, interpolation, ior and fresnel; a row of value and weight
-// each.
+// Rows of (N, 5) cos theta, exponent, interpolation, ior and fresnel; a row of LiveAlbedo each.
 py::array_t<double> live_albedo_rows(const DirectionArray& arguments) {
   if (arguments.ndim() != 2 || arguments.shape(1) != 5) {
     throw InputError("arguments: expected an array of shape (N, 5).");
   }
   const py::ssize_t count = arguments.shape(0);
-  py::array_t<double> result({count, py::ssize_t{2}});
+  py::array_t<double> result({count, py::ssize_t{3}});
   const double* in = arguments.data();
   double* out = result.mutable_data();
   const py::gil_scoped_release release;
-  for (py::ssize_t i = 0; i < count; ++i, in += 5, out += 2) {
+  for (py::ssize_t i = 0; i < count; ++i, in += 5, out += 3) {
     const LiveAlbedo albedo = live_albedo(in[0], in[1], in[2], in[3], in[4]);
-    out[0] = albedo.value;
-    out[1] = albedo.weight;
+    out[0] = albedo.until_4_5;
+    out[1] = albedo.since_5_0;
+    out[2] = albedo.weight;
   }
   return result;
 }
@@ -775,10 +775,11 @@ void bind_functions(py::module_& module) {
              "Phong's specular term ('exact') or an alteration of it ('half-vector', 'dot', "
              "'difference', 'cross') at normals (3, N), (N), one by one or in lanes; gamma is that "
              "of the last three.");
-  module.def("live_albedo", &live_albedo_rows, py::arg("arguments"),
-             "What the specular closures of the live node group reflect of a white world, and the "
-             "sum of their weights, (N, 2), for k_s = 1 and rows of cos theta, exponent, "
-             "interpolation, ior and fresnel, (N, 5).");
+  module.def(
+      "live_albedo", &live_albedo_rows, py::arg("arguments"),
+      "What the specular closures of the live node group reflect of a white world until "
+      "Blender 4.5 and since 5.0, and the sum of their weights, (N, 3), for k_s = 1 and rows "
+      "of cos theta, exponent, interpolation, ior and fresnel, (N, 5).");
   module.def(
       "evaluate_principled",
       [](const py::dict& principled, const DirectionArray& wi, const DirectionArray& wo) {
