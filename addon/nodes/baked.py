@@ -13,14 +13,12 @@ from typing import Any
 
 import bpy
 
-from .tree import NodeFormulas, Scalar, Vector
+from .tree import Curve, NodeFormulas, Scalar, Vector, set_points
 
 # Added to the tangent: at normal incidence, where closures are isotropic, nothing else tells it
 # from the normal, and Cycles makes NaN of a tangent along the normal. Its direction is one that no
 # modelled surface faces.
 TINY_TANGENT = (3.7e-7, 5.9e-7, 7.1e-7)
-
-Curve = Sequence[Sequence[float]]  # points [cosine, value]
 
 
 def baked_group(name: str, closures: Mapping[str, Any]) -> bpy.types.ShaderNodeTree:
@@ -106,7 +104,7 @@ class _Group:
             return self.tint.times(tuple(curve[0][1] for curve in weight)).named(label)
         if weight[0] == weight[1] == weight[2]:
             return (self.tint * self._float_curve(label, weight[0])).named(f"tinted {label}")
-        curves = Vector(self.formulas, self._rgb_curves(label, weight))
+        curves = self.formulas.rgb_curves(label, self.cosine, weight)
         return self.tint.times(curves).named(f"tinted {label}")
 
     def _curves(self, label: str, curves: Sequence[Curve]) -> list[Scalar | float]:
@@ -116,10 +114,8 @@ class _Group:
         if len(varying) == 1:
             values[varying[0]] = self._float_curve(label, curves[varying[0]])
         elif varying:
-            socket = self._rgb_curves(label, curves)
-            separate = self.formulas.node(
-                "ShaderNodeSeparateXYZ", Vector=Vector(self.formulas, socket)
-            )
+            vector = self.formulas.rgb_curves(label, self.cosine, curves)
+            separate = self.formulas.node("ShaderNodeSeparateXYZ", Vector=vector)
             for index in varying:
                 values[index] = Scalar(self.formulas, separate.outputs[index])
         return values
@@ -127,17 +123,9 @@ class _Group:
     def _float_curve(self, label: str, curve: Curve) -> Scalar:
         node = self.formulas.node("ShaderNodeFloatCurve", Value=self.cosine)
         node.label = label
-        _set_points(node.mapping, node.mapping.curves[0], curve)
+        set_points(node.mapping, node.mapping.curves[0], curve)
         node.mapping.update()
         return Scalar(self.formulas, node.outputs[0])
-
-    def _rgb_curves(self, label: str, curves: Sequence[Curve]) -> bpy.types.NodeSocket:
-        node = self.formulas.node("ShaderNodeRGBCurve", Color=self.cosine)
-        node.label = label
-        for mapped, curve in zip(node.mapping.curves, curves, strict=False):
-            _set_points(node.mapping, mapped, curve)
-        node.mapping.update()
-        return node.outputs[0]
 
     def _sum(self, shaders: Sequence[bpy.types.NodeSocket]) -> None:
         links, total = self.formulas.tree.links, shaders[0]
@@ -147,15 +135,3 @@ class _Group:
             links.new(shader, both.inputs[1])
             total = both.outputs[0]
         links.new(total, self.formulas.node("NodeGroupOutput").inputs[0])
-
-
-def _set_points(mapping: bpy.types.CurveMapping, mapped: bpy.types.CurveMap, curve: Curve) -> None:
-    # Clipping would cut values outside of [0, 1] as the points are set.
-    mapping.use_clip = False
-    mapping.extend = "HORIZONTAL"
-    points = curve if len(curve) > 1 else [(0.0, curve[0][1]), (1.0, curve[0][1])]
-    while len(mapped.points) < len(points):
-        mapped.points.new(0.0, 0.0)
-    for point, (cosine, value) in zip(mapped.points, points, strict=True):
-        point.location = (cosine, value)
-        point.handle_type = "VECTOR"

@@ -1,7 +1,9 @@
 """The node group 'Lobefit Live': the interpolated lobe in closed form, every parameter a socket.
 
 A Beckmann closure with a bent normal, a broad one that fills in where the lobe is wide, and a
-diffuse one. The formulas are derived in native/closures/live_lobe.h, and
+diffuse one. With Conserve Energy the two reflect at every view angle, before Fresnel, what they
+reflect at normal incidence otherwise; at 0, as files of version 2 have it, nothing of that is
+computed. The formulas are derived in native/closures/live_lobe.h, and
 native/closures/live_lobe.cpp computes the same in C++ with the same names, so that previews need no
 rendering.
 """
@@ -13,12 +15,13 @@ from typing import Any
 
 import bpy
 
+from .live_energy import masking
 from .tree import NodeFormulas, Scalar, Vector
 
 NAME = "Lobefit Live"
 # Saved with the group: a file's group is used again only if it is the same group. To be raised
 # with any change of the formulas.
-VERSION = 2
+VERSION = 3
 VERSION_KEY = "lobefit_version"
 
 # Sharper lobes are drawn as this one, with the same albedo: single precision loses their peak.
@@ -126,6 +129,8 @@ def _add_sockets(group: bpy.types.ShaderNodeTree) -> None:
     normal = group.interface.new_socket("Normal", in_out="INPUT", socket_type="NodeSocketVector")
     normal.hide_value = True
     group.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+    # Last, so that the sockets before it have the identifiers of version 1.
+    add("Conserve Energy", "Float", 0.0)
 
 
 @dataclass
@@ -138,6 +143,7 @@ class _Inputs:
     ior: Scalar
     fresnel: Scalar
     normal: Vector
+    conserve: Scalar
 
 
 @dataclass
@@ -172,12 +178,17 @@ class _Lobe:
 
 @dataclass
 class _Closure:
-    """A Beckmann closure; its weight is 4 pi k_s F amount / sqrt(inverse_x2 inverse_y2)."""
+    """A Beckmann closure; its weight is 4 pi k_s F amount alpha2."""
 
     inverse_x2: Scalar
     inverse_y2: Scalar
     amount: Scalar
     normal: Vector
+
+    @property
+    def alpha2(self) -> Scalar:
+        """alpha_x alpha_y."""
+        return (self.inverse_x2 * self.inverse_y2).inverse_sqrt()
 
 
 def _add_nodes(formulas: NodeFormulas) -> None:
@@ -215,6 +226,7 @@ def _inputs(formulas: NodeFormulas) -> _Inputs:
         ior=scalar("IOR").at_least(1.0).named("eta"),
         fresnel=scalar("Fresnel").at_least(0.0).at_most(1.0),
         normal=Vector(formulas, bump.outputs["Normal"]).normalised().named("normal"),
+        conserve=scalar("Conserve Energy").at_least(0.0).at_most(1.0),
     )
 
 
@@ -336,13 +348,12 @@ def _shaders(
     fresnel: _Fresnel,
     closures: list[_Closure],
 ) -> None:
-    k_s = inputs.strength / normal_albedo(inputs.exponent, inputs.interpolation)
-    strength = k_s.named("k_s") * fresnel.value * (4 * math.pi)
+    strength = _strength(formulas, inputs, view, closures) * fresnel.value
     links = formulas.tree.links
     total = formulas.node("ShaderNodeBsdfDiffuse", Color=inputs.base_color, Normal=inputs.normal)
     for closure in closures:
         # Cycles takes sqrt(alpha) as roughness, and the ratio of the two alphas as anisotropy.
-        alpha2 = (closure.inverse_x2 * closure.inverse_y2).inverse_sqrt()
+        alpha2 = closure.alpha2
         ratio = (closure.inverse_y2 / closure.inverse_x2).sqrt().sqrt()
         specular = formulas.node(
             "ShaderNodeBsdfAnisotropic",
@@ -358,3 +369,21 @@ def _shaders(
         links.new(total.outputs[0], both.inputs[1])
         total = both
     links.new(total.outputs[0], formulas.node("NodeGroupOutput").inputs[0])
+
+
+def _strength(
+    formulas: NodeFormulas, inputs: _Inputs, view: _View, closures: list[_Closure]
+) -> Scalar:
+    """4 pi k_s, of a lobe that reflects the same at every view angle as far as energy is conserved.
+
+    What both closures reflect for 4 pi k_s = 1 and F = 1 is the sum of their weights, less what
+    masking takes.
+    """
+    s, alpha = inputs.exponent, inputs.interpolation
+    unit = normal_albedo(s, alpha) / (4 * math.pi)
+    bent, broad = closures
+    weight = bent.amount * bent.alpha2 + broad.amount * broad.alpha2
+    reflected = weight * masking(formulas, view.cosine, view.tan2, s, alpha)
+    # A product with 0 is what Cycles leaves out, with all that it is made of.
+    missing = (1 - unit / reflected).named("missing") * inputs.conserve
+    return (inputs.strength / unit).named("4 pi k_s") * (1 - missing)

@@ -8,7 +8,7 @@ Nodes are collapsed and laid out from left to right, frame by frame, and named i
 source: the same source always makes the same tree.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Self
 
@@ -19,6 +19,9 @@ NODE_WIDTH = 150.0
 ROW_HEIGHT = 50.0
 OPEN_HEIGHT = 350.0
 FRAME_GAP = 80.0
+
+
+Curve = Sequence[Sequence[float]]  # points [place, value]
 
 
 class Value:
@@ -176,6 +179,15 @@ class NodeFormulas:
             self._operations[key] = node.outputs[output]
         return self._operations[key]
 
+    def rgb_curves(self, label: str, place: Scalar, curves: Sequence[Curve]) -> Vector:
+        """Three curves seen at `place`, in [0, 1], by one RGB Curve node."""
+        node = self.node("ShaderNodeRGBCurve", Color=place)
+        node.label = label
+        for mapped, curve in zip(node.mapping.curves, curves, strict=False):
+            set_points(node.mapping, mapped, curve)
+        node.mapping.update()
+        return Vector(self, node.outputs[0])
+
     def _set(self, socket: bpy.types.NodeSocket, value: Any) -> None:
         if isinstance(value, Value):
             self.tree.links.new(value.socket, socket)
@@ -208,6 +220,19 @@ class NodeFormulas:
             node.location, node.width = (column * COLUMN_WIDTH, y), NODE_WIDTH
             heights[column] = y - (ROW_HEIGHT if node.hide else OPEN_HEIGHT)
         return len(heights)
+
+
+def set_points(mapping: bpy.types.CurveMapping, mapped: bpy.types.CurveMap, curve: Curve) -> None:
+    """Makes the curve of a node go in straight lines through these points."""
+    # Clipping would cut values outside of [0, 1] as the points are set.
+    mapping.use_clip = False
+    mapping.extend = "HORIZONTAL"
+    points = curve if len(curve) > 1 else [(0.0, curve[0][1]), (1.0, curve[0][1])]
+    while len(mapped.points) < len(points):
+        mapped.points.new(0.0, 0.0)
+    for point, (place, value) in zip(mapped.points, points, strict=True):
+        point.location = (place, value)
+        point.handle_type = "VECTOR"
 
 
 def empty_shader_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:

@@ -49,6 +49,35 @@ Fresnel fresnel_terms(double tan2, double ior, double fresnel) {
   return {value, slope / 4, (value - facing) / (value + facing)};
 }
 
+// Half vectors are taken by equal parts of D (n'.wh) d wh, which is a Gaussian of their slopes, so
+// that a narrow closure costs no more than a wide one.
+LiveAlbedo white_albedo(const LiveClosure& closure, const Vector3& wo) {
+  constexpr int rings = 40, sectors = 48;  // within 1e-3
+  const Shape shape{std::log(closure.alpha_x), std::log(closure.alpha_y), closure.tilt};
+  const Microfacet microfacet(Distribution::beckmann, shape, wo);
+  const double shrink = 1 / std::sqrt(1 + square(closure.tilt));
+  const Vector3 normal(closure.tilt * shrink, 0, shrink), along(shrink, 0, -closure.tilt * shrink);
+  double sampled = 0, beyond = 0;
+  for (int ring = 0; ring < rings; ++ring) {
+    // Rings crowd where slopes are large.
+    const double root = 1 - (ring + 0.5) / rings, slope = std::sqrt(-2 * std::log(root));
+    for (int sector = 0; sector < sectors; ++sector) {
+      // The plane of incidence is a plane of symmetry: half a turn is enough.
+      const double phi = (sector + 0.5) * pi / sectors;
+      const Vector3 half = closure.alpha_x * slope * std::cos(phi) * along +
+                           closure.alpha_y * slope * std::sin(phi) * Vector3::UnitY() + normal;
+      const double incidence = wo.dot(half);
+      const Vector3 wi = 2 * incidence / half.squaredNorm() * half - wo;
+      if (!(incidence > 0 && wi.z() > 0)) continue;
+      const double part = 2 * root * incidence * microfacet.visible(wi);
+      sampled += part;
+      if (normal.dot(wi) <= 0) beyond += part;
+    }
+  }
+  const double scale = closure.weight / (rings * sectors * normal.dot(wo));
+  return {sampled * scale, (sampled - beyond) * scale, closure.weight};
+}
+
 }  // namespace
 
 double normal_albedo(double exponent, double interpolation) {
@@ -109,6 +138,14 @@ LiveClosures live_closures(double cos_view, double exponent, double interpolatio
 
   return {{tilt, 1 / std::sqrt(inverse_x2), 1 / std::sqrt(inverse_y2), weight},
           {0, 1 / std::sqrt(broad_x2), 1 / std::sqrt(broad_y2), broad_weight}};
+}
+
+LiveAlbedo live_albedo(double cos_view, double exponent, double interpolation, double ior,
+                       double fresnel) {
+  const auto [bent, broad] = live_closures(cos_view, exponent, interpolation, ior, fresnel);
+  const Vector3 wo(std::sqrt(1 - square(cos_view)), 0, cos_view);
+  const LiveAlbedo a = white_albedo(bent, wo), b = white_albedo(broad, wo);
+  return {a.until_4_5 + b.until_4_5, a.since_5_0 + b.since_5_0, a.weight + b.weight};
 }
 
 Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo) {

@@ -78,6 +78,20 @@ inline constexpr double live_exponent_limit = 1e5;
 // addon/nodes/live.py multiplies by it, so what it misses cancels.
 double normal_albedo(double exponent, double interpolation);
 
+// What both closures for k_s = 1 reflect of a white world, and the sum of their weights. The ratio,
+// what masking leaves, is 0.5 to 1 and hardly depends on Fresnel. Until release 4.5, samples of a
+// closure that Cycles draws may end between the horizon of the surface and that of the bent
+// closure, where its evaluation for lamps is 0; since 5.0 they may not.
+struct LiveAlbedo {
+  double until_4_5;
+  double since_5_0;
+  double weight;
+};
+
+// By quadrature over half vectors; the arguments are those of live_closures.
+LiveAlbedo live_albedo(double cos_view, double exponent, double interpolation, double ior,
+                       double fresnel);
+
 // f cos(theta_i) in 1/sr, specular and diffuse, for unit vectors toward the light (wi) and the
 // viewer (wo), n = +z; 0 below the horizon. Any model of `parameters` is one interpolated lobe.
 Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo);

@@ -47,6 +47,12 @@ Microfacet::Microfacet(Distribution distribution, const Shape& shape, const Vect
   m.masking_o = masking(distribution, m.slope_o.value);
 }
 
+double Microfacet::visible(const Vector3& wi) const {
+  const double above = wi.z() + terms_.tilt * wi.x();
+  const double slope_i = slope(terms_, Direction<double>{wi.x(), wi.y(), wi.z()}, above).value;
+  return 1 / (masking(terms_.distribution, slope_i).value + terms_.masking_o.value);
+}
+
 double Microfacet::evaluate(const Vector3& wi, const Vector3& half) const {
   return closure_value<false, double>(terms_, {wi.x(), wi.y(), wi.z()},
                                       {half.x(), half.y(), half.z()})

@@ -36,6 +36,8 @@ class Microfacet {
   // For a light at wi and the half vector of wi and wo, both of unit length.
   double evaluate(const Vector3& wi, const Vector3& half) const;
   ClosureValue<double> evaluate_with_derivatives(const Vector3& wi, const Vector3& half) const;
+  // G alone, also for a light between the closure's own horizon and that of the surface.
+  double visible(const Vector3& wi) const;
 
   const MicrofacetTerms& terms() const { return terms_; }
 

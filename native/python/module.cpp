@@ -6,6 +6,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -35,9 +36,11 @@
 #include "measurement/parallel.h"
 #include "measurement/read_measurement.h"
 #include "measurement/rgl.h"
+#include "preview/phong_terms.h"
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
 #include "reflectance/model.h"
+#include "reflectance/phong_energy.h"
 
 namespace py = pybind11;
 
@@ -321,6 +324,71 @@ Reflectance principled_reflectance(const Principled& principled) {
 
 Reflectance closures_reflectance(const ClosureSet& closures) {
   return [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
+}
+
+// A row of value, by_exponent and by_angle for each exponent and angle in degrees, (N) each.
+py::array_t<double> phong_energy_rows(bool modified, const DirectionArray& exponent,
+                                      const DirectionArray& angle) {
+  if (exponent.ndim() != 1 || angle.ndim() != 1 || exponent.size() != angle.size()) {
+    throw InputError("energy: expected as many exponents as angles.");
+  }
+  py::array_t<double> result({exponent.size(), py::ssize_t{3}});
+  auto rows = result.mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < exponent.size(); ++i) {
+    const auto view = ViewAngle<double>::from_degrees(angle.at(i));
+    const double n = exponent.at(i);
+    const auto energy = modified ? modified_phong_energy(n, view) : phong_energy(n, view);
+    rows(i, 0) = energy.value;
+    rows(i, 1) = energy.by_exponent;
+    rows(i, 2) = energy.by_angle;
+  }
+  return result;
+}
+
+using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+// Phong's specular term or an alteration of it at normals (3, N).
+py::array_t<float> phong_terms(const std::string& term, double exponent, int gamma,
+                               const std::array<double, 3>& light,
+                               const std::array<double, 3>& viewer, const FloatArray& normals,
+                               bool lanes) {
+  if (normals.ndim() != 2 || normals.shape(0) != 3 || normals.size() == 0) {
+    throw InputError("normals: expected an array of shape (3, N).");
+  }
+  if (gamma != 4 && gamma != 8 && gamma != 16 && gamma != 32) {
+    throw InputError("gamma: expected 4, 8, 16 or 32, found " + std::to_string(gamma) + ".");
+  }
+  const PhongTermInput input{phong_term_named(term),
+                             exponent,
+                             std::countr_zero(static_cast<unsigned>(gamma)),
+                             Vector3(light.data()),
+                             Vector3(viewer.data()),
+                             static_cast<std::size_t>(normals.shape(1)),
+                             {normals.data(0, 0), normals.data(1, 0), normals.data(2, 0)}};
+  py::array_t<float> result(normals.shape(1));
+  float* terms = result.mutable_data();
+  const py::gil_scoped_release release;
+  lanes ? phong_terms_in_lanes(input, terms) : phong_terms_one_by_one(input, terms);
+  return result;
+}
+
+// Rows of (N, 5) cos theta, exponent, interpolation, ior and fresnel; a row of LiveAlbedo each.
+py::array_t<double> live_albedo_rows(const DirectionArray& arguments) {
+  if (arguments.ndim() != 2 || arguments.shape(1) != 5) {
+    throw InputError("arguments: expected an array of shape (N, 5).");
+  }
+  const py::ssize_t count = arguments.shape(0);
+  py::array_t<double> result({count, py::ssize_t{3}});
+  const double* in = arguments.data();
+  double* out = result.mutable_data();
+  const py::gil_scoped_release release;
+  for (py::ssize_t i = 0; i < count; ++i, in += 5, out += 3) {
+    const LiveAlbedo albedo = live_albedo(in[0], in[1], in[2], in[3], in[4]);
+    out[0] = albedo.until_4_5;
+    out[1] = albedo.since_5_0;
+    out[2] = albedo.weight;
+  }
+  return result;
 }
 
 Reflectance measured_reflectance(SharedMeasurement measurement) {
@@ -691,6 +759,10 @@ void bind_functions(py::module_& module) {
         return evaluate_rows(model_reflectance(parameters_from(parameters)), wi, wo);
       },
       py::arg("parameters"), py::arg("wi"), py::arg("wo"), "f in 1/sr, (N, 3).");
+  module.def("phong_energy", &phong_energy_rows, py::arg("modified"), py::arg("exponent"),
+             py::arg("angle"),
+             "The integral of Phong's or modified Phong's lobe and its derivatives by exponent and "
+             "angle (per radian), (N, 3), for (N) exponents and angles in degrees.");
   module.def(
       "evaluate_live",
       [](const py::dict& parameters, const DirectionArray& wi, const DirectionArray& wo) {
@@ -698,6 +770,16 @@ void bind_functions(py::module_& module) {
       },
       py::arg("parameters"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of the live node group as Cycles renders it, (N, 3).");
+  module.def("phong_terms", &phong_terms, py::arg("term"), py::arg("exponent"), py::arg("gamma"),
+             py::arg("light"), py::arg("viewer"), py::arg("normals"), py::arg("lanes"),
+             "Phong's specular term ('exact') or an alteration of it ('half-vector', 'dot', "
+             "'difference', 'cross') at normals (3, N), (N), one by one or in lanes; gamma is that "
+             "of the last three.");
+  module.def(
+      "live_albedo", &live_albedo_rows, py::arg("arguments"),
+      "What the specular closures of the live node group reflect of a white world until "
+      "Blender 4.5 and since 5.0, and the sum of their weights, (N, 3), for k_s = 1 and rows "
+      "of cos theta, exponent, interpolation, ior and fresnel, (N, 5).");
   module.def(
       "evaluate_principled",
       [](const py::dict& principled, const DirectionArray& wi, const DirectionArray& wo) {

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "reflectance/albedo.h"
 #include "reflectance/fresnel.h"
 
 namespace lobefit {
@@ -202,6 +203,26 @@ TEST(LiveLobe, StaysNearTheFormula) {
     EXPECT_LT(relative_error(lobe, radians(30)), c.at_30) << c.exponent << " " << c.interpolation;
     EXPECT_LT(relative_error(lobe, radians(60)), c.at_60) << c.exponent << " " << c.interpolation;
     EXPECT_LT(relative_error(lobe, radians(80)), c.at_80) << c.exponent << " " << c.interpolation;
+  }
+}
+
+TEST(LiveAlbedo, IsTheIntegralOfTheLobe) {
+  for (const double exponent : {0.5, 4.0, 60.0, 2000.0}) {
+    for (const double alpha : {0.0, 0.6}) {
+      const Parameters lobe = interpolated(exponent, alpha, 1.5);
+      const Reflectance f = [&](const Vector3& wi, const Vector3& wo) {
+        return Rgb(live_lobe(lobe, wi, wo) / wi.z());
+      };
+      for (const double theta : {0.0, 0.4, 0.8, 1.3}) {
+        const LiveAlbedo albedo = live_albedo(std::cos(theta), exponent, alpha, 1.5, 1);
+        // Both are sums of some thousand directions.
+        EXPECT_NEAR(albedo.since_5_0 / directional_albedo(f, theta)[0], 1, 3e-3)
+            << exponent << " " << alpha << " " << theta;
+        EXPECT_GE(albedo.until_4_5, albedo.since_5_0);
+        EXPECT_LE(albedo.until_4_5, albedo.weight * (1 + 1e-9));
+        EXPECT_GT(albedo.since_5_0, albedo.weight / 2);
+      }
+    }
   }
 }
 

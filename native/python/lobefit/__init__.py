@@ -11,11 +11,13 @@ Nothing here needs Blender; materials are built from a record by the package `lo
 from lobefit._native import Cancelled, InputError, Measurement
 from lobefit._native import version as __version__
 from lobefit.fitting import Closures, Job, closures, closures_for, fit, read, start_fit
+from lobefit.phong_energy import Energy, energy
 from lobefit.record import Record
 
 __all__ = [
     "Cancelled",
     "Closures",
+    "Energy",
     "InputError",
     "Job",
     "Measurement",
@@ -23,6 +25,7 @@ __all__ = [
     "__version__",
     "closures",
     "closures_for",
+    "energy",
     "fit",
     "read",
     "start_fit",

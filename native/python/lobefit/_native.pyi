@@ -1,6 +1,7 @@
 """Types of the compiled module; directions are unit vectors in the frame n = +z, one a row."""
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -92,9 +93,20 @@ def sample(name: str) -> Measurement: ...
 def evaluate_model(
     parameters: dict[str, Any], wi: ArrayLike, wo: ArrayLike
 ) -> NDArray[np.float64]: ...
+def phong_energy(modified: bool, exponent: ArrayLike, angle: ArrayLike) -> NDArray[np.float64]: ...
 def evaluate_live(
     parameters: dict[str, Any], wi: ArrayLike, wo: ArrayLike
 ) -> NDArray[np.float64]: ...
+def phong_terms(
+    term: str,
+    exponent: float,
+    gamma: int,
+    light: Sequence[float],
+    viewer: Sequence[float],
+    normals: ArrayLike,
+    lanes: bool,
+) -> NDArray[np.float32]: ...
+def live_albedo(arguments: ArrayLike) -> NDArray[np.float64]: ...
 def evaluate_principled(
     principled: dict[str, Any], wi: ArrayLike, wo: ArrayLike
 ) -> NDArray[np.float64]: ...

@@ -18,6 +18,7 @@ from typing import Any, NoReturn, TypeVar
 
 from lobefit import (
     _native,
+    alterations,
     blender,
     export,
     methods,
@@ -40,6 +41,7 @@ from lobefit.inputs import (
 )
 from lobefit.library import items_of, records_folder
 from lobefit.origin import origin_of, write_samples
+from lobefit.phong_energy import LOBES, MOST_EXPONENT, energy
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
@@ -171,6 +173,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_library,
         _add_export,
         _add_simplify,
+        _add_energy,
         _add_report,
     ):
         add(commands)
@@ -398,6 +401,26 @@ def _add_simplify(commands: Any) -> None:
     )
     command.add_argument(
         "-o", dest="output", metavar="OUT.blend", help="without it nothing is written"
+    )
+    _add_json(command)
+
+
+def _add_energy(commands: Any) -> None:
+    command = _add(commands, _energy, "tell how much a Phong lobe reflects, which normalises it")
+    command.add_argument("--model", choices=LOBES, required=True)
+    command.add_argument(
+        "--exponent",
+        type=_within(float, 0, MOST_EXPONENT, "an exponent"),
+        required=True,
+        metavar="N",
+        help="any real one",
+    )
+    command.add_argument(
+        "--angle",
+        type=_within(float, 0, 90, "degrees"),
+        required=True,
+        metavar="DEG",
+        help="between the normal and the viewer",
     )
     _add_json(command)
 
@@ -749,6 +772,23 @@ def _simplify(options: argparse.Namespace) -> int:
     return DONE
 
 
+def _energy(options: argparse.Namespace) -> int:
+    found = energy(options.model, options.exponent, options.angle)
+    figures = {
+        "energy-conserving factor": found.conserving,
+        "energy-normalised factor": found.normalising,
+        "by exponent": found.by_exponent,
+        "by angle": found.by_angle,
+        "integral": found.integral,
+    }
+    if options.json:
+        print(json.dumps({name.replace(" ", "_"): value for name, value in figures.items()}))
+    else:
+        for name, value in figures.items():
+            print(f"{name:24} {value:.17g}")
+    return DONE
+
+
 def _report(options: argparse.Namespace) -> int:
     records: list[Record] = []
     code = _records(options, records)
@@ -759,7 +799,14 @@ def _report(options: argparse.Namespace) -> int:
             ways = {record.name: pictures.measure(record) for record in records}
         trials = {record.name: _trials(record, options.threads) for record in records}
         with progress_bar("report") as progress:
-            report.write(options.output, records, ways=ways, trials=trials, progress=progress)
+            report.write(
+                options.output,
+                records,
+                ways=ways,
+                trials=trials,
+                terms=alterations.measure(),
+                progress=progress,
+            )
         print(Path(options.output) / "index.html")
     return code
 
