@@ -318,7 +318,7 @@ struct Candidate {
 
 Principled fit_principled(const Target& target, int threads) {
   if (target.empty()) return {};
-  const Views few = thin_out(target, 12, 2), some = thin_out(target, 12, 1),
+  const Views few = thin_out(target, 12, 3), some = thin_out(target, 12, 1),
               all = thin_out(target, 2, 1, thread_count(threads));
   std::vector<Candidate> found;
   for (const Vector& start : starts(few)) found.push_back({start, 0});
@@ -336,8 +336,7 @@ Principled fit_principled(const Target& target, int threads) {
   follow(few, 0.1, 4, 8);
   follow(few, 0.03, 8, 4);
   follow(some, 0.03, 8, 2);
-  follow(all, 0.03, 3, 1);
-  follow(all, 0.01, 10, 1);
+  follow(some, 0.01, 10, 1);
   follow(all, 0.003, 10, 1);
   const Vector& best = found.front().x;
   Principled result;

@@ -4,7 +4,7 @@ RECORD is a record or a measured file; closures that a record lacks are fitted f
 material is rendered by Cycles on the processor and on the graphics card: the sphere under its two
 lights, one sample a sun, and in a constant world. Off is the sum of |difference| as a part of the
 sum of the picture, worst the largest difference of a pixel as a part of the brightest one; at most
-1e-3 is wanted of the first. The last columns are the seconds that the card takes for 4096 samples
+1e-3 is wanted of the first. The last columns are the seconds that the card takes for 1024 samples
 a pixel of the world's picture, the least of three, and their ratio to the best-fit Principled BSDF.
 """
 
@@ -26,7 +26,7 @@ from lobefit_addon.scene import radiance, render_pixels, two_lights_scene, unifo
 from numpy.typing import NDArray
 
 BACKENDS = ("OPTIX", "CUDA", "HIP", "ONEAPI", "METAL")
-SIZE, SAMPLES, MANY_SAMPLES = 256, 16, 4096
+SIZE, SAMPLES, MANY_SAMPLES = 256, 16, 1024
 
 
 def use_card(wanted: str | None) -> str:
