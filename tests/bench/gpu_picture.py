@@ -25,6 +25,8 @@ from lobefit_addon import build_material
 from lobefit_addon.scene import radiance, render_pixels, two_lights_scene, uniform_world
 from numpy.typing import NDArray
 
+# Kind and count of specular closures; the first is the unit of the seconds.
+WAYS = [("principled", None), *pictures.COMPARED, ("live", None)]
 BACKENDS = ("OPTIX", "CUDA", "HIP", "ONEAPI", "METAL")
 SIZE, SAMPLES, MANY_SAMPLES = 256, 16, 1024
 
@@ -94,14 +96,6 @@ def seconds(scene: bpy.types.Scene) -> float:
     return min(times)
 
 
-def materials_of(record: Record) -> dict[str, bpy.types.Material]:
-    materials = {"Principled, best fit": build_material(record, "principled")}
-    for target, count in pictures.COMPARED:
-        materials[f"{target} {count}"] = build_material(record, target, count=count)
-    materials["live"] = build_material(record, "live")
-    return materials
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("records", nargs="+", type=Path)
@@ -116,15 +110,15 @@ def main() -> None:
     for path in options.records:
         record = pictures.with_closures(record_of(path, model="interpolated", norm=VISUAL_NORM))
         unit = None
-        for name, material in materials_of(record).items():
-            sphere.data.materials[0] = material
+        for kind, count in WAYS:
+            sphere.data.materials[0] = build_material(record, kind, count=count)
             with quiet():
                 figures = [figure for pair in compare(scene) for figure in pair]
                 taken = seconds(scene)
             unit = unit or taken
             cells = " | ".join(f"{figure:.1e}" for figure in figures)
             print(
-                f"| {record.name} | {name} | {cells} | {taken:.3f} | {taken / unit:.3f} |",
+                f"| {record.name} | {kind} {count or ''} | {cells} | {taken:.3f} | {taken / unit:.3f} |",
                 flush=True,
             )
 
