@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from lobefit import Record, pictures
+from lobefit import pictures
 from lobefit.blender import quiet
 from lobefit.inputs import record_of
 from lobefit.record import VISUAL_NORM
@@ -116,11 +116,8 @@ def main() -> None:
                 figures = [figure for pair in compare(scene) for figure in pair]
                 taken = seconds(scene)
             unit = unit or taken
-            cells = " | ".join(f"{figure:.1e}" for figure in figures)
-            print(
-                f"| {record.name} | {kind} {count or ''} | {cells} | {taken:.3f} | {taken / unit:.3f} |",
-                flush=True,
-            )
+            cells = [record.name, f"{kind} {count or ''}", *(f"{figure:.1e}" for figure in figures)]
+            print(f"| {' | '.join(cells)} | {taken:.3f} | {taken / unit:.3f} |", flush=True)
 
 
 if __name__ == "__main__":
