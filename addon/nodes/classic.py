@@ -22,9 +22,9 @@ VERSION = 1
 VERSION_KEY = "lobefit_classic_version"
 
 LIGHTS = 4
-# The exponent by which Blinn-Phong comes nearest to Phong, as native/reflectance/classic.h finds
-# it: within 1.5 % for exponents from 0.1 up.
-MATCH_SLOPE, MATCH_START, MATCH_RISE, MATCH_BEND = 3.5457, 0.25, 0.9, 0.8
+# The exponent by which Blinn-Phong comes nearest to Phong over spheres, as lobefit.match_exponent
+# finds it: within 2 % for exponents from 0.1 up, and 0.5 % from 1 up.
+MATCH_SLOPE, MATCH_START, MATCH_RISE, MATCH_BEND = 3.5175, 0.27, 1.27, 1.25
 
 
 def classic_group() -> bpy.types.ShaderNodeTree:
