@@ -1,6 +1,7 @@
 """The group Classic Phong / Blinn-Phong: Cycles' pixels against the formula, and its lights."""
 
 import bpy
+import lobefit
 import numpy as np
 import pytest
 from facets import UP, add, light_at, new_scene, sphere_normals
@@ -137,6 +138,12 @@ def test_matched_exponents_change_blinn_phong_alone(addon, classic, render):
         )
         rendered = render(material, light_at(30))
         assert np.abs(rendered - formula(normals, expected, half_vector)).max() < 1e-4
+
+
+@pytest.mark.parametrize(("exponent", "bound"), [(0.1, 0.02), (0.4, 0.02), (1, 0.005), (30, 0.005)])
+def test_the_group_s_match_is_near_the_best_one(addon, exponent, bound):
+    best = lobefit.match_exponent(exponent).exponent
+    assert addon.nodes.classic.matched_exponent(exponent) == pytest.approx(best, rel=bound)
 
 
 def test_a_connected_normal_is_used_and_the_colour_comes_out(classic, render):
