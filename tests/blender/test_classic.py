@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from facets import UP, add, light_at, new_scene, sphere_normals
 from mathutils import Euler
+from surroundings import described, group_node
 
 # Every light has a colour of its own, and another for its highlights; one grazes the rim from
 # behind, and no direction is of unit length.
@@ -52,7 +53,7 @@ def classic(addon):
         bpy.context.view_layer.objects.active = item
         assert bpy.ops.lobefit.make_classic() == {"FINISHED"}
         material = item.active_material
-        node = next(node for node in material.node_tree.nodes if node.type == "GROUP")
+        node = group_node(material)
         values = {
             "Ambient Color": (*AMBIENT, 1),
             "Diffuse Color": (*DIFFUSE, 1),
@@ -186,14 +187,8 @@ def test_one_group_whose_inputs_are_those_that_saved_files_hold(addon, classic):
 
 
 def test_the_same_source_makes_the_same_tree(addon):
-    def description():
-        group = addon.nodes.classic.classic_group()
-        nodes = [(n.name, n.bl_idname, n.label, tuple(n.location)) for n in group.nodes]
-        ends = [(k.from_node.name, k.to_node.name, k.to_socket.identifier) for k in group.links]
-        bpy.data.node_groups.remove(group)
-        return nodes, ends
-
-    assert description() == description()
+    group = addon.nodes.classic.classic_group
+    assert described(group()) == described(group())
 
 
 def add_sun(angles, energy, colour=(1.0, 1.0, 1.0)):
@@ -227,6 +222,17 @@ def test_lights_are_taken_from_the_scene(classic, two_lights):
     assert taken(3, "Specular") == pytest.approx(np.array([0.5, 1, 0.25]) / np.pi)
     assert taken(4, "Diffuse") == taken(4, "Specular") == [0, 0, 0]
     assert list(node.inputs["Ambient Light"].default_value)[:3] == pytest.approx([0.3] * 3)
+
+
+def test_a_new_material_takes_the_brightest_suns(addon):
+    item = add(new_scene(8), bpy.data.meshes.new("sphere"))
+    for energy in (3.0, 6.0, 1.0, 5.0, 2.0, 4.0):
+        add_sun((0.0, 0.0, 0.0), energy)
+    bpy.context.view_layer.objects.active = item
+    assert bpy.ops.lobefit.make_classic() == {"FINISHED"}
+    node = group_node(item.active_material)
+    reds = [node.inputs[f"Light {n} Diffuse"].default_value[0] for n in range(1, 5)]
+    assert np.array(reds) * np.pi == pytest.approx([6, 5, 4, 3])
 
 
 def test_without_a_sun_nothing_is_taken(classic):
