@@ -255,17 +255,16 @@ def test_a_world_of_many_colours_leaves_the_ambient_light(classic, two_lights):
     assert list(node.inputs["Ambient Light"].default_value)[:3] == pytest.approx(AMBIENT_LIGHT)
 
 
-def test_a_taken_sun_shows_the_diffuse_closure_s_picture(classic, render):
+def test_a_taken_sun_shows_the_diffuse_closure_s_picture(addon, classic, render):
     material, node = classic(**{"Specular Color": (0, 0, 0, 1), "Ambient Color": (0, 0, 0, 1)})
     add_sun((0.4, 0.3, 0.2), 1.0)
     bpy.ops.lobefit.take_lights()
     direction = np.array(node.inputs["Light 1 Direction"].default_value)
     plain = bpy.data.materials.new("diffuse")
-    plain.use_nodes = True
-    plain.node_tree.nodes.clear()
-    closure = plain.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
+    tree = addon.nodes.tree.empty_shader_tree(plain)
+    closure = tree.nodes.new("ShaderNodeBsdfDiffuse")
     closure.inputs["Color"].default_value = (*DIFFUSE, 1)
-    output = plain.node_tree.nodes.new("ShaderNodeOutputMaterial")
-    plain.node_tree.links.new(closure.outputs[0], output.inputs["Surface"])
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(closure.outputs[0], output.inputs["Surface"])
     expected = render(plain, direction)
     assert np.abs(render(material, direction) - expected).max() < 1e-5 and expected.max() > 0.1
