@@ -9,6 +9,11 @@ import bpy
 
 from . import native
 from .nodes.material import BAKED, shown_by
+from .operators.classic import (
+    LOBEFIT_OT_make_classic,
+    LOBEFIT_OT_take_lights,
+    classic_nodes,
+)
 from .operators.fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .operators.import_measured import LOBEFIT_OT_import_measured
 from .operators.preview import LOBEFIT_OT_preview, icons_of
@@ -70,6 +75,7 @@ class LOBEFIT_PT_import_measured(_MaterialPanel, bpy.types.Panel):
             draw_progress(self.layout)
         else:
             _draw_hint(self.layout, active_material(context), _characters(context))
+            _draw_classic(self.layout, active_material(context))
 
 
 class LOBEFIT_PT_simplify_scene(bpy.types.Panel):
@@ -151,6 +157,13 @@ def _draw_hint(layout: Any, material: bpy.types.Material | None, characters: int
     what = "No material is selected." if material is None else "This material is not measured."
     _paragraph(layout, f"{what} Import a measurement to make one:", "INFO", characters)
     layout.operator(LOBEFIT_OT_import_measured.bl_idname, icon="IMPORT")
+
+
+def _draw_classic(layout: Any, material: bpy.types.Material | None) -> None:
+    if classic_nodes(material):
+        layout.operator(LOBEFIT_OT_take_lights.bl_idname, icon="LIGHT_SUN")
+    else:
+        layout.operator(LOBEFIT_OT_make_classic.bl_idname, icon="ADD")
 
 
 def _draw_record(layout: Any, record: dict[str, Any], characters: int) -> None:

@@ -16,11 +16,10 @@ from typing import Any
 import bpy
 
 from .live_energy import masking
-from .tree import NodeFormulas, Scalar, Vector
+from .tree import NodeFormulas, Scalar, Vector, versioned_group
 
 NAME = "Lobefit Live"
-# Saved with the group: a file's group is used again only if it is the same group. To be raised
-# with any change of the formulas.
+# Saved with the group: to be raised with any change of the formulas.
 VERSION = 3
 VERSION_KEY = "lobefit_version"
 
@@ -100,14 +99,12 @@ def _interpolated(parameters: Mapping[str, Any]) -> tuple[list[float], list[floa
 
 def live_group() -> bpy.types.ShaderNodeTree:
     """The group of this version in this file, made if it is not there yet."""
-    for group in bpy.data.node_groups:
-        if group.library is None and group.get(VERSION_KEY) == VERSION:
-            return group
-    group = bpy.data.node_groups.new(NAME, "ShaderNodeTree")
-    group[VERSION_KEY] = VERSION
+    return versioned_group(NAME, VERSION_KEY, VERSION, _fill)
+
+
+def _fill(group: bpy.types.ShaderNodeTree) -> None:
     _add_sockets(group)
     _add_nodes(NodeFormulas(group))
-    return group
 
 
 def _add_sockets(group: bpy.types.ShaderNodeTree) -> None:

@@ -8,7 +8,7 @@ Nodes are collapsed and laid out from left to right, frame by frame, and named i
 source: the same source always makes the same tree.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Self
 
@@ -84,6 +84,9 @@ class Scalar(Value):
 
     def exp(self) -> "Scalar":
         return self._math("EXPONENT", self)
+
+    def power(self, exponent: "Scalar | float") -> "Scalar":
+        return self._math("POWER", self, exponent)
 
     def at_least(self, other: "Scalar | float") -> "Scalar":
         return self._math("MAXIMUM", self, other)
@@ -233,6 +236,22 @@ def set_points(mapping: bpy.types.CurveMapping, mapped: bpy.types.CurveMap, curv
     for point, (place, value) in zip(mapped.points, points, strict=True):
         point.location = (place, value)
         point.handle_type = "VECTOR"
+
+
+def versioned_group(
+    name: str, key: str, version: int, fill: Callable[[bpy.types.ShaderNodeTree], None]
+) -> bpy.types.ShaderNodeTree:
+    """The file's own group that holds this version under the key, made by `fill` if there is none.
+
+    A file's group is used again only if it is the same group.
+    """
+    for group in bpy.data.node_groups:
+        if group.library is None and group.get(key) == version:
+            return group
+    group = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    group[key] = version
+    fill(group)
+    return group
 
 
 def empty_shader_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:

@@ -3,6 +3,7 @@
 import bpy
 
 from . import export, library, preview
+from .classic import LOBEFIT_OT_make_classic, LOBEFIT_OT_take_lights
 from .export import LOBEFIT_OT_export_measured
 from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .import_measured import LOBEFIT_FH_measured, LOBEFIT_OT_import_measured, draw_menu
@@ -20,6 +21,8 @@ _CLASSES = (
     LOBEFIT_OT_make_library,
     LOBEFIT_OT_add_asset_library,
     LOBEFIT_OT_export_measured,
+    LOBEFIT_OT_make_classic,
+    LOBEFIT_OT_take_lights,
 )
 
 # What the operators add to menus of Blender's.

@@ -13,6 +13,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +40,7 @@
 #include "preview/phong_terms.h"
 #include "preview/two_lights.h"
 #include "reflectance/abc.h"
+#include "reflectance/classic.h"
 #include "reflectance/model.h"
 #include "reflectance/phong_energy.h"
 
@@ -397,8 +399,28 @@ Reflectance measured_reflectance(SharedMeasurement measurement) {
   };
 }
 
+ClassicMaterial classic_from(const py::dict& dict) {
+  const auto model = dict["model"].cast<std::string>();
+  if (model != "classic-phong" && model != "classic-blinn-phong") {
+    throw InputError("model: expected 'classic-phong' or 'classic-blinn-phong', found '" + model +
+                     "'.");
+  }
+  return {rgb_from(dict, "diffuse"), rgb_from(dict, "specular"), rgb_from(dict, "exponent"),
+          model == "classic-blinn-phong"};
+}
+
+py::dict matched_exponent(double exponent, std::optional<double> angle) {
+  using namespace py::literals;
+  const py::gil_scoped_release release;
+  const auto radians = angle ? std::optional(*angle * pi / 180) : std::nullopt;
+  const ExponentMatch match = match_exponent(exponent, radians);
+  const py::gil_scoped_acquire acquire;
+  return py::dict("exponent"_a = match.exponent, "error"_a = match.error,
+                  "error_of_four"_a = match.error_of_four);
+}
+
 // f cos of what a preview can show: a Measurement, a dict of parameters, ("live", parameters),
-// ("principled", its dict) or ("closures", an entry of a record's closures).
+// ("principled", its dict), ("classic", its dict) or ("closures", an entry of a record's closures).
 Reflectance previewed(const py::object& source) {
   if (py::isinstance<Measurement>(source)) {
     return with_cosine(measured_reflectance(source.cast<SharedMeasurement>()));
@@ -410,7 +432,9 @@ Reflectance previewed(const py::object& source) {
   if (kind == "live") return live_reflectance(parameters_from(dict));
   if (kind == "principled") return principled_reflectance(principled_from(dict));
   if (kind == "closures") return closures_reflectance(closures_from(dict));
-  throw InputError("preview: expected 'live', 'principled' or 'closures', found '" + kind + "'.");
+  if (kind == "classic") return classic_reflectance(classic_from(dict));
+  throw InputError("preview: expected 'live', 'principled', 'classic' or 'closures', found '" +
+                   kind + "'.");
 }
 
 py::array_t<float> preview(const py::object& source, int size, double world) {
@@ -763,6 +787,20 @@ void bind_functions(py::module_& module) {
              py::arg("angle"),
              "The integral of Phong's or modified Phong's lobe and its derivatives by exponent and "
              "angle (per radian), (N, 3), for (N) exponents and angles in degrees.");
+  module.def("match_exponent", &matched_exponent, py::arg("exponent"), py::arg("angle"),
+             "Blinn-Phong's exponent nearest to Phong's (0.1 to 1e8), its error and that of four "
+             "times the exponent, at a view angle in degrees or over spheres (None).");
+  module.def(
+      "evaluate_classic",
+      [](const py::dict& classic, const DirectionArray& wi, const DirectionArray& wo) {
+        return evaluate_rows(
+            [material = classic_from(classic)](const Vector3& light, const Vector3& viewer) {
+              return evaluate_classic(material, light, viewer);
+            },
+            wi, wo);
+      },
+      py::arg("classic"), py::arg("wi"), py::arg("wo"),
+      "What a light of i_d = i_s = 1 adds in the classic model, (N, 3).");
   module.def(
       "evaluate_live",
       [](const py::dict& parameters, const DirectionArray& wi, const DirectionArray& wo) {
@@ -797,8 +835,9 @@ void bind_functions(py::module_& module) {
   module.def("preview", &preview, py::arg("source"), py::arg("size"), py::arg("world") = 0.0,
              "The sphere under two lights and a world of the radiance `world` (0 to 1e6), "
              "(size, size, 3) linear, row 0 at the top. source: a Measurement, a dict of "
-             "parameters, ('live', parameters), ('principled', its dict) or ('closures', an entry "
-             "of a record's closures).");
+             "parameters, ('live', parameters), ('principled', its dict), ('closures', an entry of "
+             "a record's closures) or ('classic', a dict of model 'classic-phong' or "
+             "'classic-blinn-phong', diffuse k_d, specular k_s and exponent).");
 }
 
 }  // namespace

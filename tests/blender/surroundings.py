@@ -13,6 +13,14 @@ def group_node(material):
     return next(node for node in material.node_tree.nodes if node.type == "GROUP")
 
 
+def described(group):
+    """All of a group that its source tells, as values; the group is removed."""
+    nodes = [(n.name, n.bl_idname, n.label, tuple(n.location)) for n in group.nodes]
+    ends = [(k.from_node.name, k.to_node.name, k.to_socket.identifier) for k in group.links]
+    bpy.data.node_groups.remove(group)
+    return nodes, ends
+
+
 def connect_normal(material, socket):
     material.node_tree.links.new(socket, group_node(material).inputs["Normal"])
 

@@ -15,10 +15,12 @@ OPERATORS = [
     "export_measured",
     "fit",
     "import_measured",
+    "make_classic",
     "make_library",
     "preview",
     "restore_scene",
     "simplify_scene",
+    "take_lights",
 ]
 
 
@@ -117,13 +119,13 @@ def test_unregister_ends_a_fit(addon, measured_file):
 
 def test_panel_without_a_material(addon):
     layout = draw_panel()
-    assert layout.operators == ["import_measured"]
+    assert layout.operators == ["import_measured", "make_classic"]
     assert "No material is selected" in " ".join(layout.texts)
 
 
 def test_panel_with_another_material(addon):
     layout = draw_panel(material=bpy.data.materials.new("plain"))
-    assert layout.operators == ["import_measured"]
+    assert layout.operators == ["import_measured", "make_classic"]
 
 
 def test_panel_with_a_measured_material(addon, material):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from facets import SIZE, UP, light_at, local, sphere_normals
 from mathutils import Matrix, Vector
-from surroundings import group_node, white_world_albedo
+from surroundings import described, group_node, white_world_albedo
 
 PRINCIPLED = {
     "base_color": [0.1, 0.2, 0.3],
@@ -87,14 +87,8 @@ def test_a_group_of_another_version_is_left_alone(addon, build):
 
 
 def test_the_same_source_makes_the_same_tree(addon):
-    def description():
-        group = addon.nodes.live.live_group()
-        nodes = [(n.name, n.bl_idname, n.label, tuple(n.location)) for n in group.nodes]
-        ends = [(k.from_node.name, k.to_node.name, k.to_socket.identifier) for k in group.links]
-        bpy.data.node_groups.remove(group)
-        return nodes, ends
-
-    assert description() == description()
+    group = addon.nodes.live.live_group
+    assert described(group()) == described(group())
 
 
 def test_two_outputs_and_the_record(build):

@@ -10,6 +10,7 @@ Nothing here needs Blender; materials are built from a record by the package `lo
 
 from lobefit._native import Cancelled, InputError, Measurement
 from lobefit._native import version as __version__
+from lobefit.classic import ExponentMatch, match_exponent
 from lobefit.fitting import Closures, Job, closures, closures_for, fit, read, start_fit
 from lobefit.phong_energy import Energy, energy
 from lobefit.record import Record
@@ -18,6 +19,7 @@ __all__ = [
     "Cancelled",
     "Closures",
     "Energy",
+    "ExponentMatch",
     "InputError",
     "Job",
     "Measurement",
@@ -27,6 +29,7 @@ __all__ = [
     "closures_for",
     "energy",
     "fit",
+    "match_exponent",
     "read",
     "start_fit",
 ]

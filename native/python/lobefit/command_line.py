@@ -31,6 +31,8 @@ from lobefit import (
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
+from lobefit.classic import LEAST_EXPONENT, match_exponent
+from lobefit.classic import MOST_EXPONENT as MOST_EXPONENT_TO_MATCH
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
     MEASUREMENT_SUFFIXES,
@@ -174,6 +176,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_export,
         _add_simplify,
         _add_energy,
+        _add_match_exponent,
         _add_report,
     ):
         add(commands)
@@ -182,7 +185,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add(commands: Any, run: Callable[[argparse.Namespace], int], text: str) -> Any:
     """A command named as the function that runs it."""
-    name = run.__name__.removeprefix("_")
+    name = run.__name__.removeprefix("_").replace("_", "-")
     command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
     command.set_defaults(run=run)
     return command
@@ -319,6 +322,11 @@ def _add_preview(commands: Any) -> None:
         default=preview.SPHERE,
         help="pixels a sphere; " + _DEFAULT,
     )
+    command.add_argument(
+        "--classic",
+        action="store_true",
+        help="also as classic Phong and Blinn-Phong, which old renderers and games have, show it",
+    )
     command.add_argument("-o", dest="output", required=True, metavar="PICTURE.png")
 
 
@@ -421,6 +429,27 @@ def _add_energy(commands: Any) -> None:
         required=True,
         metavar="DEG",
         help="between the normal and the viewer",
+    )
+    _add_json(command)
+
+
+def _add_match_exponent(commands: Any) -> None:
+    command = _add(
+        commands, _match_exponent, "find Blinn-Phong's exponent that comes nearest to Phong's"
+    )
+    command.add_argument(
+        "--exponent",
+        type=_within(float, LEAST_EXPONENT, MOST_EXPONENT_TO_MATCH, "an exponent"),
+        nargs="+",
+        required=True,
+        metavar="N",
+        help="of classic Phong's (R.V)^N; several make a table",
+    )
+    command.add_argument(
+        "--angle",
+        type=_within(float, 0, 90, "degrees"),
+        metavar="DEG",
+        help="between the normal and the viewer; without it, over spheres lit from everywhere",
     )
     _add_json(command)
 
@@ -659,7 +688,10 @@ def _preview(options: argparse.Namespace) -> int:
     code = _records(options, records)
     if records:
         size = options.size
-        rows = [preview.row(record, preview.measurement_of(record), size) for record in records]
+        rows = [
+            preview.row(record, preview.measurement_of(record), size, classic=options.classic)
+            for record in records
+        ]
         picture.write_png(options.output, preview.sheet(rows, size))
         print(options.output)
     return code
@@ -786,6 +818,21 @@ def _energy(options: argparse.Namespace) -> int:
     else:
         for name, value in figures.items():
             print(f"{name:24} {value:.17g}")
+    return DONE
+
+
+def _match_exponent(options: argparse.Namespace) -> int:
+    if not options.json:
+        print(f"{'exponent':>10}{'matched':>12}{'times':>9}{'error':>9}{'error of 4 times':>18}")
+    for exponent in options.exponent:
+        match = match_exponent(exponent, options.angle)
+        if options.json:
+            print(json.dumps({"phong_exponent": exponent, **vars(match)}))
+        else:
+            print(
+                f"{exponent:10g}{match.exponent:12.6g}{match.exponent / exponent:9.3f}"
+                f"{match.error:9.4f}{match.error_of_four:18.4f}"
+            )
     return DONE
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lobefit import _native, lettering, picture
 from lobefit._native import Measurement
+from lobefit.classic import as_classic
 from lobefit.origin import is_unchanged
 from lobefit.picture import Image
 from lobefit.record import Record
@@ -21,6 +22,8 @@ TITLES = {
     "modified-phong": "modified Phong",
     "modified-blinn-phong": "modified Blinn-Phong",
     "interpolated": "interpolated",
+    "classic-phong": "classic Phong",
+    "classic-blinn-phong": "classic Blinn-Phong",
     "cycles": "as Cycles will show it",
     "rendered": "rendered by Cycles",
     "difference": f"difference x{AMPLIFIED}",
@@ -64,16 +67,21 @@ def row(
     size: int = SPHERE,
     rendered: NDArray[np.float32] | None = None,
     shown: tuple[str, dict[str, Any]] | None = None,
+    classic: bool = False,
 ) -> Row:
     """The spheres of a record, all at the exposure that suits the first of them.
 
     `shown` is what Cycles is to show, as `_native.preview` takes it: if None, the measured closures
     in the record that are nearest, or else the live group. `rendered` is the radiance that Cycles
-    itself gave, FINER * size pixels wide.
+    itself gave, FINER * size pixels wide. With `classic` there are also the classic materials that
+    come of the fit, as old renderers and games would show them.
     """
     linear = {"measured": _native.preview(measurement, size * FINER)} if measurement else {}
     for model, fit in record.fits.items():
         linear[model] = _native.preview(fit.parameters, size * FINER)
+    materials = as_classic(record.parameters) if classic else {}
+    for model, material in materials.items():
+        linear[model] = _native.preview(("classic", material), size * FINER)
     shown = shown or _nearest(record)
     linear["cycles"] = _native.preview(shown, size * FINER)
     figure = record.leading_figure
@@ -81,6 +89,9 @@ def row(
         model: f"{FIGURES[figure]} {fit.error[figure]['pooled']:.3f}"
         for model, fit in record.fits.items()
     }
+    for model, material in materials.items():
+        powers = " ".join(f"{power:.4g}" for power in np.ravel(material["exponent"]))
+        captions[model] = f"exponent {powers}"
     captions["cycles"] = _caption(shown, record)
     if rendered is not None:
         linear["rendered"] = rendered
