@@ -1,7 +1,8 @@
 """The command line: `lobefit COMMAND`, a thin layer over the Python interface.
 
-Exit codes: 0 done; 1 some of several inputs failed, each named, the others done; 2 wrong use or an
-unreadable input; 130 interrupted. Results go to stdout, messages and the progress bar to stderr.
+Exit codes: 0 done; 1 some of several inputs failed, each named, the others done, or the self-test
+did; 2 wrong use or an unreadable input; 130 interrupted. Results go to stdout, messages and the
+progress bar to stderr.
 """
 
 import argparse
@@ -31,6 +32,7 @@ from lobefit import (
 from lobefit._native import Cancelled, InputError
 from lobefit.atomic import make_folder, place_to_write, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
+from lobefit.diagnosis import diagnose
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
     MEASUREMENT_SUFFIXES,
@@ -175,6 +177,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_simplify,
         _add_energy,
         _add_report,
+        _add_diagnose,
     ):
         add(commands)
     return parser
@@ -431,6 +434,10 @@ def _add_report(commands: Any) -> None:
     _add_fit_options(command, model="all", norm=VISUAL_NORM)
     command.set_defaults(uncertainty=True)
     command.add_argument("-o", dest="output", required=True, metavar="DIR")
+
+
+def _add_diagnose(commands: Any) -> None:
+    _add_json(_add(commands, _diagnose, "tell versions, machine and a self-test, for a report"))
 
 
 def _within(kind: type, low: float, high: float, what: str) -> Callable[[str], Any]:
@@ -809,6 +816,12 @@ def _report(options: argparse.Namespace) -> int:
             )
         print(Path(options.output) / "index.html")
     return code
+
+
+def _diagnose(options: argparse.Namespace) -> int:
+    diagnosis = diagnose()
+    print(json.dumps(diagnosis.entries()) if options.json else diagnosis)
+    return DONE if diagnosis.passed else SOME_FAILED
 
 
 def _trials(record: Record, threads: int) -> list[methods.Trial]:
