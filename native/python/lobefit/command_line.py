@@ -522,7 +522,8 @@ def _fit_lines(fit: Fit) -> Iterator[str]:
         for (low, high), misfit, measured in list(steps)[::3]:
             error = misfit / measured if measured > 0 else None
             yield f"view at {low:2g} to {high:2g} deg  relative error {_numbers(error)}"
-    for angle, measured, model in zip(*fit.albedo.values(), strict=True):
+    albedos = (fit.albedo[name] for name in ("view_angle", "measured", "model"))
+    for angle, measured, model in zip(*albedos, strict=True):
         yield f"albedo at {angle:2g} deg  measured {_numbers(measured)}, model {_numbers(model)}"
     for warning in fit.warnings:
         yield f"warning: {warning}"
