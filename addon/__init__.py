@@ -4,7 +4,7 @@ The wheel carries the same folder as the package `lobefit_addon`, which builds m
 being registered: `lobefit_addon.build_material(record)`.
 """
 
-from . import cli, native, operators, panels
+from . import cli, native, operators, panels, preferences
 from .nodes.material import build_material
 
 __all__ = ["build_material", "register", "unregister"]
@@ -15,11 +15,13 @@ def register() -> None:
     native.problem.cache_clear()
     operators.register()
     panels.register()
+    preferences.register()
     cli.register()
 
 
 def unregister() -> None:
     """Removes all of it, and ends a fit that is under way."""
     cli.unregister()
+    preferences.unregister()
     panels.unregister()
     operators.unregister()

@@ -28,7 +28,7 @@ def problem() -> str:
             "install the Lobefit package for this platform and Blender release."
         )
     found = {"version": module.__version__, "build_id": compiled.build_id}
-    for key, wanted in _own_identity().items():
+    for key, wanted in own_identity().items():
         if found[key] != wanted:
             return (
                 f"Lobefit's add-on is of {key.replace('_', ' ')} {wanted[:12]} and its compiled "
@@ -38,7 +38,7 @@ def problem() -> str:
     return ""
 
 
-def _own_identity() -> dict[str, str]:
+def own_identity() -> dict[str, str]:
     """The version of the add-on and, where it was packaged, the build it was packaged with."""
     manifest = tomllib.loads((_HERE / "blender_manifest.toml").read_text(encoding="utf-8"))
     identity = {"version": manifest["version"]}

@@ -53,7 +53,7 @@ class LOBEFIT_PT_measured_brdf(_MaterialPanel, bpy.types.Panel):
             return
         material = active_material(context)
         record = record_of(material)
-        _draw_problem(body, context)
+        draw_problem(body, context)
         if current():
             draw_progress(body)
         _draw_record(body, record, _characters(context))
@@ -70,7 +70,7 @@ class LOBEFIT_PT_import_measured(_MaterialPanel, bpy.types.Panel):
         return not LOBEFIT_PT_measured_brdf.poll(context)
 
     def draw(self, context: bpy.types.Context) -> None:
-        _draw_problem(self.layout, context)
+        draw_problem(self.layout, context)
         if current():
             draw_progress(self.layout)
         else:
@@ -88,7 +88,7 @@ class LOBEFIT_PT_simplify_scene(bpy.types.Panel):
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        _draw_problem(self.layout, context)
+        draw_problem(self.layout, context)
         if current():
             draw_progress(self.layout)
             return
@@ -133,7 +133,8 @@ def _kind(way: dict[str, Any]) -> str:
     return f"{way['kind']} {way['count']}" if way["kind"] in BAKED else way["kind"]
 
 
-def _draw_problem(layout: Any, context: bpy.types.Context) -> None:
+def draw_problem(layout: Any, context: bpy.types.Context) -> None:
+    """What keeps the compiled module from being used, if anything does."""
     if native.problem():
         _paragraph(layout, native.problem(), "ERROR", _characters(context))
 

@@ -111,7 +111,7 @@ class RowReader {
   // Reads `piece_theta_d` steps of theta_d from the first-th in the file on.
   void read(int first, double* values) const {
     const auto before = static_cast<std::size_t>(phi_bins_) * static_cast<std::size_t>(first);
-    const auto count = static_cast<std::size_t>(phi_bins_ * piece_theta_d);
+    const auto count = static_cast<std::size_t>(phi_bins_) * piece_theta_d;
     file_.read(sizeof(Dimensions) + sizeof(double) * before, values, sizeof(double) * count);
   }
 

@@ -32,6 +32,7 @@
 #include "fitting/variables.h"
 #include "measurement/input_error.h"
 #include "measurement/input_file.h"
+#include "measurement/instructions.h"
 #include "measurement/measurement.h"
 #include "measurement/merl.h"
 #include "measurement/parallel.h"
@@ -832,6 +833,8 @@ void bind_functions(py::module_& module) {
       },
       py::arg("closures"), py::arg("wi"), py::arg("wo"),
       "f cos(theta_i) of an entry of a record's closures as Cycles renders it, (N, 3).");
+  module.def("uses_avx2", &uses_avx2,
+             "Whether the version of the code for AVX2 runs on this processor.");
   module.def("preview", &preview, py::arg("source"), py::arg("size"), py::arg("world") = 0.0,
              "The sphere under two lights and a world of the radiance `world` (0 to 1e6), "
              "(size, size, 3) linear, row 0 at the top. source: a Measurement, a dict of "

@@ -12,6 +12,7 @@ import pytest
 OPERATORS = [
     "add_asset_library",
     "cancel_fit",
+    "copy_diagnostics",
     "export_measured",
     "fit",
     "import_measured",
@@ -162,6 +163,40 @@ def drawn(panel):
     layout = Recorder()
     Drawn(layout=layout).draw(bpy.context)
     return layout
+
+
+class _Executed(SimpleNamespace):
+    """Stands in for an operator and its context: Blender without a window has no clipboard."""
+
+    def report(self, _kind, _text):
+        pass
+
+
+@pytest.fixture
+def copied(addon):
+    """What Copy Diagnostics copies."""
+
+    def copy():
+        context = SimpleNamespace(window_manager=SimpleNamespace(clipboard=""))
+        operator = addon.preferences.LOBEFIT_OT_copy_diagnostics
+        assert operator.execute(_Executed(), context) == {"FINISHED"}
+        return context.window_manager.clipboard
+
+    return copy
+
+
+def test_preferences_copy_diagnostics(addon, copied):
+    assert drawn(addon.preferences.LOBEFIT_AP_preferences).operators == ["copy_diagnostics"]
+    text = copied()
+    assert bpy.app.version_string in text and lobefit._native.build_id in text
+    assert text.count("passed") == 3 and "FAILED" not in text
+
+
+def test_diagnostics_without_the_compiled_module(native, copied, monkeypatch):
+    monkeypatch.setitem(sys.modules, "lobefit", None)
+    text = copied()
+    assert native.problem() in text
+    assert bpy.app.version_string in text and native.own_identity()["version"] in text
 
 
 def test_panel_of_the_scene(addon, material):

@@ -46,6 +46,14 @@ class Merl : public ::testing::Test {
     return path();
   }
 
+  // Flips bits of the byte at a place of the file, and returns what it was.
+  char patch(std::streamoff at, int bits) const {
+    std::fstream both(path(), std::ios::binary | std::ios::in | std::ios::out);
+    const char was = static_cast<char>(both.seekg(at).get());
+    both.seekp(at).put(static_cast<char>(was ^ bits));
+    return was;
+  }
+
   static std::string sentence(const fs::path& path) {
     try {
       read_measurement(path);
@@ -147,6 +155,35 @@ TEST_F(Merl, SaysWhatIsWrongWithAFile) {
   expect(file({90, 90, 180}, full, std::nan("")), "no valid bin (0 negative, 1,096,216 not finite");
   std::ofstream(path()) << "diffuse 0.1 0.2 0.3";
   expect(path(), "found text");
+}
+
+TEST_F(Merl, EveryWrongByteOfTheHeadIsSeen) {
+  fs::resize_file(file({90, 90, 180}, 0), merl_bytes);
+  for (std::streamoff at = 0; at < 12; ++at) {
+    for (const int flip : {0x01, 0x10, 0x80, 0xff}) {
+      const char right = patch(at, flip);
+      EXPECT_NE(sentence(path()).find("expected a MERL table"), std::string::npos) << at;
+      EXPECT_EQ(patch(at, flip), static_cast<char>(right ^ flip));
+    }
+  }
+  EXPECT_EQ(sentence(path()), "read without complaint");
+}
+
+// Zeros are valid; what ones make of them is no number, in whichever bin and plane.
+TEST_F(Merl, DamageSlidingOverTheValuesCostsTheBinsItMeets) {
+  fs::resize_file(file({90, 90, 180}, 0), merl_bytes);
+  const int valid = read_measurement(path()).bins().valid;
+  constexpr std::streamoff step =
+      4999999;  // a prime, so that values are met at each of their bytes
+  for (std::streamoff at = 12; at + 8 < static_cast<std::streamoff>(merl_bytes); at += step) {
+    for (int byte = 0; byte < 8; ++byte) patch(at + byte, 0xff);
+    const BinCounts bins = read_measurement(path()).bins();
+    // Eight bytes meet two values at most; some bins are below the horizon anyway.
+    EXPECT_GE(bins.valid, valid - 2) << at;
+    EXPECT_EQ(bins.valid + bins.non_finite + bins.negative, valid) << at;
+    for (int byte = 0; byte < 8; ++byte) patch(at + byte, 0xff);
+  }
+  EXPECT_EQ(read_measurement(path()).bins().valid, valid);
 }
 
 TEST_F(Merl, RefusesEveryShorterHead) {

@@ -2,9 +2,11 @@
 
 import dataclasses
 import json
+from collections.abc import Iterator
 
 import pytest
 from lobefit import InputError, Record
+from lobefit.command_line import _fit_lines
 from lobefit.record import Fit
 
 
@@ -180,6 +182,10 @@ def change(data, path, value):
         (["closures", 0, "specular", 0, "bend", 1, 0], 0, "bend to be points of rising cosine"),
         (["closures", 0, "specular", 0, "bend", 0], [0], "bend[0] to be a list of 2, found [0]."),
         (["uncertainty", "undetermined"], ["k_s"], "to be one of diffuse red, ior, found"),
+        (["uncertainty", "variables", 0], "diffuse", "variables[0] to be one of diffuse red, "),
+        (["uncertainty", "high", "ior"], None, "variables[1] to be one of diffuse red"),
+        (["albedo", "model"], [], "expected albedo.model to be a list of 2, found []."),
+        (["closures", 0, "by_view", "relative_error"], [], "relative_error to be a list of 1, f"),
         (["uncertainty", "correlation"], [[1.0]], "correlation to be a list of 2, found [[1.0]]."),
         (["uncertainty", "low"], None, "expected uncertainty.low to be an object, found null."),
         (["error_by_angle", "view", "misfit"], [], "view.misfit to be a list of 1, found []."),
@@ -222,3 +228,63 @@ def test_no_file_and_a_folder_are_no_records(tmp_path):
         Record.load(tmp_path / "none.json")
     with pytest.raises(InputError, match="found a folder"):
         Record.load(tmp_path)
+
+
+@pytest.fixture
+def whole(record) -> bytes:
+    """A record with everything in it that a record can have."""
+    names = [field.name for field in dataclasses.fields(Fit)]
+    record.closures = [closures()]
+    record.uncertainty, record.error_by_angle = uncertainty(record), BY_ANGLE
+    record.models = {"interpolated": Fit(**{name: getattr(record, name) for name in names})}
+    return json.dumps(dataclasses.asdict(record), separators=(",", ":")).encode()
+
+
+def complaint(data: bytes) -> str:
+    """What is wrong with a record, in one sentence; empty when all that uses it finds its way."""
+    try:
+        record = Record.from_json(data, "damaged")
+    except InputError as error:
+        said = str(error)
+        assert said.startswith("damaged: expected ") and said.endswith(".") and "\n" not in said
+        return said
+    for fit in record.fits.values():
+        list(_fit_lines(fit))
+    assert record.name is not None and record.command()
+    assert Record.from_json(record.to_json()) == record
+    return ""
+
+
+def damaged(whole: bytes) -> Iterator[bytes]:
+    for at, byte in enumerate(whole):
+        for flip in (0x01, 0x80):
+            yield whole[:at] + bytes([byte ^ flip]) + whole[at + 1 :]
+
+
+def test_every_wrong_byte_is_seen_or_harmless(whole):
+    assert complaint(whole) == ""
+    said = list(map(complaint, damaged(whole)))
+    # Digits and names of files may be any; most bytes are neither.
+    assert sum(map(bool, said)) > len(said) / 2
+
+
+def test_every_cut_is_seen(whole):
+    for end in range(len(whole)):
+        assert complaint(whole[:end]), end
+
+
+@pytest.mark.parametrize("patch", [b"\0" * 8, b"[" * 8, b'"' * 3, b"9" * 400, b"null", b"", b"{}"])
+def test_sliding_damage_is_seen_or_harmless(whole, patch):
+    places = range(0, len(whole), 5)  # which share no factor with the eight bytes that are lost
+    said = [complaint(whole[:at] + patch + whole[at + 8 :]) for at in places]
+    assert any(said)
+
+
+@pytest.mark.parametrize("number", ["1e999", "-1e999", "9" * 400, "9" * 5000, "1e-400", "-0.0"])
+def test_absurd_numbers_are_seen_or_harmless(whole, number):
+    text = whole.decode()
+    places = [at for at in range(1, len(text)) if text[at - 1] in "[,:" and text[at].isdigit()]
+    assert len(places) > 100
+    for at in places:
+        end = next(i for i in range(at, len(text)) if text[i] in ",]}")
+        complaint((text[:at] + number + text[end:]).encode())

@@ -117,6 +117,7 @@ def evaluate_principled(
 def evaluate_closures(
     closures: dict[str, Any], wi: ArrayLike, wo: ArrayLike
 ) -> NDArray[np.float64]: ...
+def uses_avx2() -> bool: ...
 def preview(
     source: Measurement | dict[str, Any] | tuple[str, dict[str, Any]],
     size: int,

@@ -1,7 +1,8 @@
 """The command line: `lobefit COMMAND`, a thin layer over the Python interface.
 
-Exit codes: 0 done; 1 some of several inputs failed, each named, the others done; 2 wrong use or an
-unreadable input; 130 interrupted. Results go to stdout, messages and the progress bar to stderr.
+Exit codes: 0 done; 1 some of several inputs failed, each named, the others done, or the self-test
+did; 2 wrong use or an unreadable input; 130 interrupted. Results go to stdout, messages and the
+progress bar to stderr.
 """
 
 import argparse
@@ -33,6 +34,7 @@ from lobefit.atomic import make_folder, place_to_write, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
 from lobefit.classic import LEAST_EXPONENT, match_exponent
 from lobefit.classic import MOST_EXPONENT as MOST_EXPONENT_TO_MATCH
+from lobefit.diagnosis import diagnose
 from lobefit.fitting import MOST_CLOSURES, TARGETS, TOLERANCE, Closures, closures_for, read
 from lobefit.inputs import (
     MEASUREMENT_SUFFIXES,
@@ -178,6 +180,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_energy,
         _add_match_exponent,
         _add_report,
+        _add_diagnose,
     ):
         add(commands)
     return parser
@@ -462,6 +465,10 @@ def _add_report(commands: Any) -> None:
     command.add_argument("-o", dest="output", required=True, metavar="DIR")
 
 
+def _add_diagnose(commands: Any) -> None:
+    _add_json(_add(commands, _diagnose, "tell versions, machine and a self-test, for a report"))
+
+
 def _within(kind: type, low: float, high: float, what: str) -> Callable[[str], Any]:
     """A reader of numbers from low to high for argparse."""
 
@@ -544,7 +551,8 @@ def _fit_lines(fit: Fit) -> Iterator[str]:
         for (low, high), misfit, measured in list(steps)[::3]:
             error = misfit / measured if measured > 0 else None
             yield f"view at {low:2g} to {high:2g} deg  relative error {_numbers(error)}"
-    for angle, measured, model in zip(*fit.albedo.values(), strict=True):
+    albedos = (fit.albedo[name] for name in ("view_angle", "measured", "model"))
+    for angle, measured, model in zip(*albedos, strict=True):
         yield f"albedo at {angle:2g} deg  measured {_numbers(measured)}, model {_numbers(model)}"
     for warning in fit.warnings:
         yield f"warning: {warning}"
@@ -856,6 +864,12 @@ def _report(options: argparse.Namespace) -> int:
             )
         print(Path(options.output) / "index.html")
     return code
+
+
+def _diagnose(options: argparse.Namespace) -> int:
+    diagnosis = diagnose()
+    print(json.dumps(diagnosis.entries()) if options.json else diagnosis)
+    return DONE if diagnosis.passed else SOME_FAILED
 
 
 def _trials(record: Record, threads: int) -> list[methods.Trial]:

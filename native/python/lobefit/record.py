@@ -7,7 +7,7 @@ import math
 import os
 import platform
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ SCHEDULES = ("stages", "polish", "joint", "subsample")
 NORMS = ("l1", "cosine-l1", "l2", "log-l2")
 ERRORS = ("l1", "relative_l1", "relative_l1_80", "relative_l1_cosine")
 
-_CHANNELS = ("red", "green", "blue", "")
+_CHANNELS = ("red", "green", "blue")
 
 # The norm of fits that are made to be looked at: plain L1 is the paper's, but bins near grazing,
 # of which a picture shows little, rule it.
@@ -360,16 +360,37 @@ def _parts(*angles: str) -> _Check:
     return check
 
 
+def _rows(rows: dict[str, _Check]) -> _Check:
+    """An entry for each view angle; `rows` tells what each entry of a list is."""
+
+    def check(value: Any, where: str) -> None:
+        _object({"view_angle": _list(_NUMBER)})(value, where)
+        count = len(value["view_angle"])
+        _object({name: _list(row, count) for name, row in rows.items()})(value, where)
+
+    return check
+
+
+def _variables_of(parameters: dict[str, Any]) -> Iterator[str]:
+    """The variables that these parameters have numbers of."""
+    for name in ("diffuse", "specular", "exponent", "interpolation", "ior"):
+        if isinstance(parameters[name], list):
+            yield from (f"{name} {channel}" for channel in _CHANNELS)
+        elif parameters[name] is not None:
+            yield name
+
+
 def _uncertainty(value: Any, where: str) -> None:
-    _object({"variables": _list(_TEXT)})(value, where)
+    _object({"low": _PARAMETERS, "high": _PARAMETERS})(value, where)
+    high = set(_variables_of(value["high"]))
+    known = [name for name in _variables_of(value["low"]) if name in high]
+    _object({"variables": _list(_choice(*known))})(value, where)
     names = value["variables"]
     _object(
         {
             "confidence": _INTERPOLATION,
             "blocks": _COUNT,
             "seconds": _AMOUNT,
-            "low": _PARAMETERS,
-            "high": _PARAMETERS,
             "undetermined": _list(_choice(*names)),
             "correlation": _list(_list(_NUMBER, len(names)), len(names)),
         }
@@ -387,7 +408,7 @@ _AMOUNT = _number(0, note="a number of at least 0")
 _INTERPOLATION = _number(0, 1, "a number from 0 to 1")
 _UNKNOWN = _or_null(_NUMBER)
 _COLOR = _list(_AMOUNT, 3)
-_COLORS = _list(_list(_UNKNOWN, 3))
+_UNKNOWN_COLOR = _list(_UNKNOWN, 3)
 _PARAMETERS = _object(
     {
         "model": _choice(*MODELS),
@@ -398,7 +419,7 @@ _PARAMETERS = _object(
         "ior": _or_null(_number(1, note="a number of at least 1")),
     }
 )
-_FIGURE = _object({"pooled": _UNKNOWN, "rgb": _list(_UNKNOWN, 3)})
+_FIGURE = _object({"pooled": _UNKNOWN, "rgb": _UNKNOWN_COLOR})
 _STAGE = _object({"name": _TEXT, "l1": _UNKNOWN, "seconds": _AMOUNT, "iterations": _COUNT})
 _PRINCIPLED = _object(
     {
@@ -418,7 +439,7 @@ _FIT: dict[str, _Check] = {
     "seconds": _object({key: _AMOUNT for key in ("read", "start", "fit", "total")}),
     "converged": _FLAG,
     "certainty": _object({"starts": _COUNT, "agree": _COUNT, "spread": _UNKNOWN}),
-    "albedo": _object({"view_angle": _list(_NUMBER), "measured": _COLORS, "model": _COLORS}),
+    "albedo": _rows({"measured": _UNKNOWN_COLOR, "model": _UNKNOWN_COLOR}),
     "warnings": _list(_TEXT),
     "principled": _PRINCIPLED,
 }
@@ -436,12 +457,11 @@ _CLOSURES = _object(
         "cap_albedo": _FLAG,
         "error": _AMOUNT,
         "seconds": _AMOUNT,
-        "by_view": _object(
+        "by_view": _rows(
             {
-                "view_angle": _list(_NUMBER),
-                "target_albedo": _COLORS,
-                "closures_albedo": _COLORS,
-                "relative_error": _list(_AMOUNT),
+                "target_albedo": _UNKNOWN_COLOR,
+                "closures_albedo": _UNKNOWN_COLOR,
+                "relative_error": _AMOUNT,
             }
         ),
         "diffuse": _list(_curve, 3),
