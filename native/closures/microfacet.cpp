@@ -59,10 +59,4 @@ double Microfacet::evaluate(const Vector3& wi, const Vector3& half) const {
       .value;
 }
 
-ClosureValue<double> Microfacet::evaluate_with_derivatives(const Vector3& wi,
-                                                           const Vector3& half) const {
-  return closure_value<true, double>(terms_, {wi.x(), wi.y(), wi.z()},
-                                     {half.x(), half.y(), half.z()});
-}
-
 }  // namespace lobefit

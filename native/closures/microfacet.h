@@ -35,10 +35,10 @@ class Microfacet {
 
   // For a light at wi and the half vector of wi and wo, both of unit length.
   double evaluate(const Vector3& wi, const Vector3& half) const;
-  ClosureValue<double> evaluate_with_derivatives(const Vector3& wi, const Vector3& half) const;
   // G alone, also for a light between the closure's own horizon and that of the surface.
   double visible(const Vector3& wi) const;
 
+  // What the formula with derivatives, closure_value in microfacet_terms.inc, takes.
   const MicrofacetTerms& terms() const { return terms_; }
 
  private:

@@ -23,9 +23,8 @@ namespace lobefit {
 //
 // where D is the tabulated distribution of normals (`ndf`), sigma the area that the surface shows
 // to the light, T the map that spreads the tabulated visible normals (`vndf`) evenly and S the
-// table
-// (`rgb` or `spectra`). Tables are bilinear between their points; those of vndf and S are there for
-// several wi and linear between them. In an isotropic file phi_m counts from the azimuth of the
+// table `rgb` or `spectra`. Tables are bilinear between their points; those of vndf and S are there
+// for several wi and linear between them. In an isotropic file phi_m counts from the azimuth of the
 // light, in an anisotropic one as it is. Spectra become linear Rec.709 by rgb_weights().
 class Rgl {
  public:

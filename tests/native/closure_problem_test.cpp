@@ -86,7 +86,7 @@ TEST(ClosureProblem, DescendsUntilNoWeightCanBeMovedForTheBetter) {
   }
 }
 
-TEST(ClosureProblem, HasTheSameBitsOnEveryProcessor) {
+TEST(ClosureProblem, HasTheSameBitsInBothVersions) {
   if (!has_avx2()) GTEST_SKIP() << "the processor has no AVX2, so there is one version alone";
   const SearchTarget views = in_columns(target());
   const Monitor monitor;
