@@ -23,8 +23,8 @@
 #endif
 
 // Declares first_NAME as the first version of NAME.
-#define FIRST(result, name, ...)     \
-  result first_##name(__VA_ARGS__);  \
+#define FIRST(result, name, ...)    \
+  result first_##name(__VA_ARGS__); \
   __asm__(".symver first_" #name "," #name "@" FIRST_VERSION)
 
 using Routine = void (*)();
