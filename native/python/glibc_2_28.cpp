@@ -1,10 +1,11 @@
 // Binds the module to the C library of 2018, glibc 2.28, that Blender itself is built against.
 //
 // Compiled on a newer system, calls of these functions ask for the newest version of each, and the
-// module would not load on Ubuntu 22.04 or RHEL 9. What is defined here is taken instead by every
-// object of the module, the static C++ library among them, and passes the call on to the version
-// that the first glibc for the processor had, or does without. `./dev package` has auditwheel look
-// for newer symbols, so a compiler or library that asks for another one is noticed.
+// module would not load on an older one, RHEL 9 with its glibc 2.34 say. What is defined here is
+// taken instead by every object of the module, the static C++ library among them, and passes the
+// call on to the version that the first glibc for the processor had, or does without. `./dev
+// package` has auditwheel look for newer symbols, so a compiler or library that asks for another
+// one is noticed.
 #include <features.h>
 
 #if defined(__GLIBC__) && (defined(__x86_64__) || defined(__aarch64__))
@@ -42,7 +43,7 @@ FIRST(int, pthread_join, pthread_t, void**);
 FIRST(int, pthread_once, pthread_once_t*, Routine);
 FIRST(int, __pthread_key_create, pthread_key_t*, Destructor);
 
-// Since 2.29 they differ in nothing but that they do not set errno by a wrapper.
+// Newer ones (2.29, hypot 2.35) compute the same; only errno is set without a detour.
 double exp(double x) { return first_exp(x); }
 double log(double x) { return first_log(x); }
 double pow(double x, double y) { return first_pow(x, y); }
