@@ -153,7 +153,7 @@ Rgb live_lobe(const Parameters& parameters, const Vector3& wi, const Vector3& wo
   const Parameters lobe = as_interpolated(parameters);
   const auto [light, viewer] = turned_to_viewer(wi, wo);
   const Vector3 half = (light + viewer).normalized();
-  const auto evaluate = [&](const LiveClosure& closure) {
+  const auto evaluate = [&half, &light = light, &viewer = viewer](const LiveClosure& closure) {
     const Shape shape{std::log(closure.alpha_x), std::log(closure.alpha_y), closure.tilt};
     return closure.weight * Microfacet(Distribution::beckmann, shape, viewer).evaluate(light, half);
   };

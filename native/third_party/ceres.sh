@@ -1,7 +1,7 @@
 #!/bin/sh
-# Builds the static Ceres Solver that Lobefit links, from Debian's own source package.
-# Usage: ceres.sh PREFIX. A prefix that was already built by this very script is left alone.
-# CMakeLists.txt runs it and gives the reasons for this way of linking Ceres.
+# Builds the static Ceres Solver that Lobefit links. Usage: ceres.sh PREFIX. A prefix that was already
+# built by this very script is left alone. CMakeLists.txt runs it and gives the reasons for this way
+# of linking Ceres.
 set -eu
 
 prefix=$1
@@ -11,27 +11,35 @@ script_sum=$(sha256sum <"$0")
 
 work="$prefix.work"
 rm -rf "$prefix" "$work"
-mkdir -p "$work/lists/partial" "$work/cache/archives/partial"
-cd "$work"
+mkdir -p "$work"
 
-# The machine's own Debian archive, asked for sources instead of packages, with private apt state:
-# no privilege is needed and the machine's package lists stay as they are.
-. /etc/os-release
-keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-line="deb-src [signed-by=$keyring] \$(REPO_URI) \$(RELEASE) \$(COMPONENT)"
-apt-get indextargets --format "$line" \
-    'Created-By: Packages' "Release: $VERSION_CODENAME" 'Component: main' | sort -u >sources.list
-if ! [ -s sources.list ]; then
-    echo "ceres.sh: expected an apt source of Debian $VERSION_CODENAME main, found none" >&2
-    exit 1
-fi
+# A source distribution brings the source of Ceres along. Where it is missing it comes from Debian's
+# source package: the machine's own archive is asked for sources instead of packages, with private
+# apt state, so that no privilege is needed and the machine's package lists stay as they are.
+source="$(cd "$(dirname "$0")" && pwd)/ceres-solver.tar.xz"
+cd "$work"
+download_source() {
+    mkdir -p lists/partial cache/archives/partial
+    . /etc/os-release
+    keyring=/usr/share/keyrings/debian-archive-keyring.gpg
+    line="deb-src [signed-by=$keyring] \$(REPO_URI) \$(RELEASE) \$(COMPONENT)"
+    apt-get indextargets --format "$line" \
+        'Created-By: Packages' "Release: $VERSION_CODENAME" 'Component: main' | sort -u >sources.list
+    if ! [ -s sources.list ]; then
+        echo "ceres.sh: expected an apt source of Debian $VERSION_CODENAME main, found none" >&2
+        exit 1
+    fi
+    private_apt_get update
+    private_apt_get source --download-only ceres-solver
+    mv ceres-solver_*.orig.tar.xz "$source"
+}
 private_apt_get() {
     apt-get -qq -o Dir::Etc::sourcelist="$PWD/sources.list" -o Dir::Etc::sourceparts=/dev/null \
         -o Dir::State::lists="$PWD/lists" -o Dir::State::status=/dev/null \
         -o Dir::Cache="$PWD/cache" -o APT::Sandbox::User=root "$@"
 }
-private_apt_get update
-private_apt_get source ceres-solver
+[ -e "$source" ] || download_source
+tar -xf "$source"
 
 # Only what a small dense problem needs. CUDA must be named, because Ceres links it where it finds
 # it. At log level -3 the bundled miniglog prints nothing but the reason of an abort.
@@ -45,7 +53,7 @@ cmake -S ceres-solver-*/ -B build -G Ninja --log-level=WARNING -Wno-dev \
     -DCUDA=OFF -DSCHUR_SPECIALIZATIONS=OFF \
     -DBUILD_TESTING=OFF -DBUILD_EXAMPLES=OFF -DBUILD_BENCHMARKS=OFF \
     -DBUILD_DOCUMENTATION=OFF -DPROVIDE_UNINSTALL_TARGET=OFF -DEXPORT_BUILD_DIR=OFF
-ninja -C build -j "$(nproc)" --quiet install
+cmake --build build --target install --parallel -- --quiet
 cd /
 rm -rf "$work"
 echo "$script_sum" >"$stamp"

@@ -1,6 +1,7 @@
 """Writes what fuzzing starts from: make_seeds.py FOLDER.
 
-For each target a folder of small files, fuzz_NAME, and words of its format, fuzz_NAME.dict.
+For each target a folder of small files, fuzz_NAME, and for binary formats their words,
+fuzz_NAME.dict.
 """
 
 import struct
@@ -10,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "blender"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+from records import plain_record, whole_record
 from rgl_file import glossy_fields, random_fields, spectral_fields, write_tensor_file
 
 _TURN = np.linspace(-np.pi, np.pi, 4)
@@ -43,6 +46,9 @@ _MERL_WORDS += [seed[-4:] for seed in _MERL.values()]
 _MERL_WORDS += [struct.pack("<d", number) for number in (np.nan, np.inf, -1.0, 1e308)]
 
 
+_RECORD = {"plain": plain_record().to_json().encode(), "whole": whole_record()}
+
+
 def _write_words(path: Path, words: list[bytes]) -> None:
     quoted = ["".join(f"\\x{byte:02x}" for byte in word) for word in dict.fromkeys(words)]
     path.write_text("".join(f'"{word}"\n' for word in quoted))
@@ -50,12 +56,14 @@ def _write_words(path: Path, words: list[bytes]) -> None:
 
 def make_seeds(folder: Path) -> None:
     """Writes the seeds and the words of every target."""
-    for name in ("fuzz_rgl", "fuzz_merl"):
+    for name in ("fuzz_rgl", "fuzz_merl", "fuzz_record"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for name, fields in _RGL.items():
         write_tensor_file(folder / "fuzz_rgl" / name, fields)
     for name, seed in _MERL.items():
         (folder / "fuzz_merl" / name).write_bytes(seed)
+    for name, seed in _RECORD.items():
+        (folder / "fuzz_record" / name).write_bytes(seed)
     _write_words(folder / "fuzz_rgl.dict", _RGL_WORDS)
     _write_words(folder / "fuzz_merl.dict", _MERL_WORDS)
 

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <stdexcept>
 #include <thread>
 
@@ -78,6 +79,30 @@ TEST(Job, OfAFitStopsSoonAfterItIsCancelled) {
   // One pass over the data, or the laying out of samples, is what a cancel can wait for.
   ASSERT_TRUE(job.wait(20s));
   EXPECT_THROW(job.result(), Cancelled);
+}
+
+// What a window does: it asks again and again, and may be closed at any moment.
+TEST(Job, MayBeWatchedCancelledAndDestroyedAtAnyMoment) {
+  const Measurement sample = sample_measurement("nickel");
+  for (int polls = 0; polls < 12; ++polls) {
+    Job<Fit> job([&](Monitor& monitor) { return fit_model(sample, {}, monitor); });
+    for (int i = 0; i < polls && !job.wait(5ms); ++i) {
+      EXPECT_NE(job.stage(), nullptr);
+      EXPECT_GE(job.progress(), 0);
+      EXPECT_LE(job.progress(), 1);
+    }
+    if (polls % 2) job.cancel();
+  }
+}
+
+// As where Python quits with a job in a global variable.
+TEST(JobDeathTest, IsJoinedWhenTheProgramEnds) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto quit = [] {
+    static const Job<int> job(until_cancelled);
+    std::exit(0);
+  };
+  EXPECT_EXIT(quit(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 import dataclasses
 import hashlib
 import inspect
+import subprocess
+import sys
 import time
 import typing
 
@@ -69,6 +71,13 @@ def test_a_cancelled_job_has_no_record(table):
     with pytest.raises(lobefit.Cancelled):
         job.record()
     assert job.done
+
+
+def test_a_program_may_end_while_a_job_runs(table):
+    program = f"import lobefit; job = lobefit.start_fit({str(table)!r}, model='all')"
+    words = [sys.executable, "-P", "-c", program]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_job_answers_while_it_works(table):

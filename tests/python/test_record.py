@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 from lobefit import InputError, Record
-from lobefit.command_line import _fit_lines
 from lobefit.record import Fit
+from records import BY_ANGLE, closures, complaint, uncertainty, whole_record
 
 
 def test_everything_is_exact_when_read_back(record, tmp_path):
@@ -47,60 +47,6 @@ def test_a_record_is_called_by_its_sample_name_first(record):
     assert record.name == "gold"
     record.source["name"] = "gold (from a paper)"
     assert record.name == "gold (from a paper)"
-
-
-CURVE = [[0.0, 1 / 3], [0.2, 5e-324], [1.0, 1e300 / 7]]
-
-
-def closures(**changes):
-    """An entry of a record's closures, with numbers that no short decimal can hold."""
-    specular = {
-        "distribution": "beckmann",
-        "roughness": CURVE,
-        "anisotropy": [[0.0, -1 / 7]],
-        "bend": CURVE,
-        "weight": [CURVE] * 3,
-    }
-    return {
-        "target": "measured",
-        "count": 1,
-        "cap_albedo": False,
-        "error": 1 / 3,
-        "seconds": 2 / 3,
-        "by_view": {
-            "view_angle": [1 / 3],
-            "target_albedo": [[0.1, 0.2, 1 / 3]],
-            "closures_albedo": [[0.1, 0.2, 1 / 7]],
-            "relative_error": [1 / 9],
-        },
-        "diffuse": [CURVE] * 3,
-        "specular": [specular],
-        **changes,
-    }
-
-
-def uncertainty(record):
-    return {
-        "confidence": 0.95,
-        "blocks": 25,
-        "seconds": 0.1,
-        "low": {**record.parameters, "ior": 1 + 1 / 3},
-        "high": {**record.parameters, "ior": 7 / 3},
-        "undetermined": ["ior"],
-        "variables": ["diffuse red", "ior"],
-        "correlation": [[1.0, -1 / 3], [-1 / 3, 1.0]],
-    }
-
-
-BY_ANGLE = {
-    "half_difference": {
-        "theta_h": [0.0, 30.0, 90.0],
-        "theta_d": [0.0, 90.0],
-        "misfit": [[1 / 3], [0.0]],
-        "measured": [[1 / 7], [6 / 7]],
-    },
-    "view": {"view_angle": [0.0, 90.0], "misfit": [1 / 3], "measured": [1.0]},
-}
 
 
 def test_uncertainty_and_error_by_angle_are_exact_when_read_back(record, tmp_path):
@@ -231,28 +177,8 @@ def test_no_file_and_a_folder_are_no_records(tmp_path):
 
 
 @pytest.fixture
-def whole(record) -> bytes:
-    """A record with everything in it that a record can have."""
-    names = [field.name for field in dataclasses.fields(Fit)]
-    record.closures = [closures()]
-    record.uncertainty, record.error_by_angle = uncertainty(record), BY_ANGLE
-    record.models = {"interpolated": Fit(**{name: getattr(record, name) for name in names})}
-    return json.dumps(dataclasses.asdict(record), separators=(",", ":")).encode()
-
-
-def complaint(data: bytes) -> str:
-    """What is wrong with a record, in one sentence; empty when all that uses it finds its way."""
-    try:
-        record = Record.from_json(data, "damaged")
-    except InputError as error:
-        said = str(error)
-        assert said.startswith("damaged: expected ") and said.endswith(".") and "\n" not in said
-        return said
-    for fit in record.fits.values():
-        list(_fit_lines(fit))
-    assert record.name is not None and record.command()
-    assert Record.from_json(record.to_json()) == record
-    return ""
+def whole() -> bytes:
+    return whole_record()
 
 
 def damaged(whole: bytes) -> Iterator[bytes]:
