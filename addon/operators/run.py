@@ -11,7 +11,7 @@ from ..jobs import Batch, Outcome
 from ..nodes.material import choose
 from ..properties import FitOptions
 
-_POLL = 0.05  # seconds between two looks at a fit
+POLL = 0.05  # seconds between two looks at a fit
 _MOST_LINES = 20  # of a pop-up that says what became of several files
 # The editors that show progress, and the region of each that does.
 _SHOWING = {"PROPERTIES": "WINDOW", "NODE_EDITOR": "UI"}
@@ -46,7 +46,7 @@ class Run:
         self.work = work
         self.conclusion: Conclusion | None = None
         self._began = time.monotonic()
-        self._timer = context.window_manager.event_timer_add(_POLL, window=context.window)
+        self._timer = context.window_manager.event_timer_add(POLL, window=context.window)
 
     @property
     def progress(self) -> float:
@@ -115,7 +115,7 @@ class RunsWork:
         """Does the work: in the background of a window, or waiting where nobody looks on."""
         global _current
         if bpy.app.background or not self.options.is_invoke:
-            while not work.advance(_POLL):
+            while not work.advance(POLL):
                 pass
             return _result_of(self.conclude_in_steps(context, work))
         _current = self._run = Run(context, work)

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -156,25 +155,29 @@ def test_of_several_files_none_is_assigned(measured_file, tmp_path):
     assert [material.use_fake_user for material in bpy.data.materials] == [True, True]
 
 
-def drop(measured_file, area, **members):
-    """What Blender does with a file that is dropped on an editor."""
-    path = Path(measured_file)
+def dropped_on(addon, area, **members):
+    """The operator after a file was dropped on an editor, which takes a window to be done."""
+    operator = addon.operators.import_measured.LOBEFIT_OT_import_measured
+
+    class Dropped(SimpleNamespace):
+        _place_by_editor = operator._place_by_editor
+        _aim_at = operator._aim_at
+
+    dropped = Dropped(directory="/", place="", location=None)
     with overriding(area, **members):
-        return bpy.ops.lobefit.import_measured(
-            "INVOKE_DEFAULT",
-            directory=str(path.parent),
-            files=[{"name": path.name}],
-            kind="principled",
-        )
+        dropped._place_by_editor(bpy.context, SimpleNamespace(mouse_x=0, mouse_y=0))
+    return dropped
 
 
-def test_a_drop_on_the_material_tab_fills_the_active_slot(measured_file):
-    cube = add(slots=3)
+def test_a_drop_on_the_material_tab_fills_the_active_slot(addon):
+    cube, dropped = add(slots=3), bpy.data.materials.new("dropped")
     cube.active_material_index = 1
-    assert drop(measured_file, editor("PROPERTIES"), object=cube) == {"FINISHED"}
-    names = [slot.material.name for slot in cube.material_slots]
-    assert names == ["slot 0", cube.active_material.name, "slot 2"]
-    assert "lobefit_record" in cube.active_material
+    assert dropped_on(addon, editor("PROPERTIES"), object=cube)._aimed.put(dropped) == ""
+    assert [slot.material.name for slot in cube.material_slots] == ["slot 0", "dropped", "slot 2"]
+
+
+def test_a_drop_on_the_material_tab_of_no_object(addon):
+    assert dropped_on(addon, editor("PROPERTIES"), object=None).place == "NONE"
 
 
 @pytest.fixture
@@ -245,10 +248,9 @@ def test_a_lobe_of_several_exponents_keeps_its_shape(addon, shader_editor, measu
     assert len({tuple(item.location) for item in added}) == len(added)
 
 
-def test_a_drop_on_the_shader_editor(shader_editor, measured_file):
-    material = plain_material()
-    assert drop(measured_file, shader_editor(material)) == {"FINISHED"}
-    assert any("lobefit_record" in node for node in material.node_tree.nodes)
+def test_a_drop_on_the_shader_editor(addon, shader_editor):
+    dropped = dropped_on(addon, shader_editor(plain_material()))
+    assert dropped.place == "NODES" and len(dropped.location) == 2
 
 
 def test_a_group_needs_a_shader_editor(measured_file):
