@@ -2,8 +2,9 @@
 
 For each file: the seconds from the start of an import of the kind Measured to its material, which
 then has its error, and the longest that the main thread was held up at once, with what it did. The
-import is polled as by its timer; a window, which this has none of, draws in between. The processor
-time of the main thread tells what was its own where the machine has other work too.
+import is polled as by its timer; a window, which this has none of, draws in between
+(tests/gui/stalls.py has one). Processor time, that of all threads and that of the main thread in
+the step, tells what was their own where the machine has other work too.
 """
 
 import argparse
@@ -55,9 +56,10 @@ class Steps:
             self.longest = max(self.longest, taken)
 
 
-def import_file(path: Path) -> tuple[float, Steps]:
-    """Imports a file; the seconds it took, and its steps."""
-    steps, operator, start = Steps(), Import(), time.perf_counter()
+def import_file(path: Path) -> tuple[float, float, Steps]:
+    """Imports a file; the seconds it took by the clock and of the processors, and its steps."""
+    steps, operator = Steps(), Import()
+    start, spent = time.perf_counter(), time.process_time()
     batch = Batch([str(path)], operator.fit_options())
     while not steps.take(batch.text, lambda: batch.advance(0.0)):
         time.sleep(POLL)
@@ -67,10 +69,10 @@ def import_file(path: Path) -> tuple[float, Steps]:
             steps.take("the material", lambda: next(conclusion))
             time.sleep(POLL)
     except StopIteration:
-        seconds = time.perf_counter() - start
+        seconds, spent = time.perf_counter() - start, time.process_time() - spent
     if operator.problems:
         raise SystemExit(operator.problems[0])
-    return seconds, steps
+    return seconds, spent, steps
 
 
 def main() -> None:
@@ -80,21 +82,19 @@ def main() -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     lobefit_addon.register()
     print(f"Blender {bpy.app.version_string}")
-    print("| file | s to the material | longest step ms | of these processor ms | at |")
-    print("|---" * 5 + "|")
+    print("| file | s to the material | s of processors | longest step ms | processor ms | at |")
+    print("|---" * 6 + "|")
     rows = []
     for path in options.files:
-        seconds, steps = import_file(path)
+        seconds, spent, steps = import_file(path)
         stall, own, name = steps.longest
-        rows.append((seconds, stall, own))
-        print(
-            f"| {path.stem} | {seconds:.2f} | {stall * 1e3:.0f} | {own * 1e3:.0f} | {name} |",
-            flush=True,
-        )
-    seconds, stalls, own = zip(*rows, strict=True)
+        rows.append((seconds, spent, stall, own))
+        cells = f"{seconds:.2f}", f"{spent:.2f}", f"{stall * 1e3:.0f}", f"{own * 1e3:.0f}"
+        print(f"| {path.stem} | {' | '.join(cells)} | {name} |", flush=True)
+    seconds, spent, stalls, own = zip(*rows, strict=True)
     print(
-        f"median {statistics.median(seconds):.2f} s; longest step {max(stalls) * 1e3:.0f} ms, "
-        f"by processor time {max(own) * 1e3:.0f} ms"
+        f"median {statistics.median(seconds):.2f} s, {statistics.median(spent):.2f} s of "
+        f"processors; longest step {max(stalls) * 1e3:.0f} ms, {max(own) * 1e3:.0f} ms of the processor"
     )
 
 
