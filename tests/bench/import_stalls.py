@@ -93,9 +93,9 @@ def main() -> None:
         print(f"| {path.stem} | {' | '.join(cells)} | {name} |", flush=True)
     seconds, spent, stalls, own = zip(*rows, strict=True)
     print(
-        f"median {statistics.median(seconds):.2f} s, {statistics.median(spent):.2f} s of "
-        f"processors; longest step {max(stalls) * 1e3:.0f} ms, {max(own) * 1e3:.0f} ms of the processor"
+        f"median {statistics.median(seconds):.2f} s, {statistics.median(spent):.2f} s of processors"
     )
+    print(f"longest step {max(stalls) * 1e3:.0f} ms, {max(own) * 1e3:.0f} ms of the processor")
 
 
 if __name__ == "__main__":
