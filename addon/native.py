@@ -3,9 +3,7 @@
 import functools
 import importlib
 import json
-import platform
 import sys
-import tomllib
 from pathlib import Path
 
 _HERE = Path(__file__).parent
@@ -40,6 +38,8 @@ def problem() -> str:
 
 def own_identity() -> dict[str, str]:
     """The version of the add-on and, where it was packaged, the build it was packaged with."""
+    import tomllib  # later than at Blender's start
+
     manifest = tomllib.loads((_HERE / "blender_manifest.toml").read_text(encoding="utf-8"))
     identity = {"version": manifest["version"]}
     build = _HERE / "build.json"
@@ -49,6 +49,8 @@ def own_identity() -> dict[str, str]:
 
 
 def _this_python() -> str:
+    import platform
+
     return f"Python {sys.version_info[0]}.{sys.version_info[1]} on {platform.machine()}"
 
 

@@ -9,6 +9,7 @@ import bpy
 
 from . import native
 from .nodes.material import BAKED, shown_by
+from .operators.add_live import LOBEFIT_OT_add_live
 from .operators.classic import (
     LOBEFIT_OT_make_classic,
     LOBEFIT_OT_take_lights,
@@ -20,9 +21,8 @@ from .operators.preview import LOBEFIT_OT_preview, icons_of
 from .operators.run import current
 from .operators.simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 from .properties import KINDS, MODELS, draw_fit_options, draw_simplify_options
-from .records import active_material, record_of
-from .simplification import result_of
-from .swaps import is_simplified
+from .records import active_material, is_simplified, record_of, result_of
+from .targets import shows_material
 
 TITLE = "Measured BRDF"
 # Up to which part of the reflected light that is off, what to call a fit.
@@ -106,6 +106,33 @@ class LOBEFIT_PT_simplify_scene(bpy.types.Panel):
             _draw_result(self.layout, result, _characters(context))
 
 
+class LOBEFIT_PT_shader_editor(bpy.types.Panel):
+    """Measured groups in the nodes that the shader editor shows"""
+
+    bl_label = TITLE
+    bl_space_type = "NODE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Node"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return shows_material(context.space_data)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_problem(self.layout, context)
+        if current():
+            draw_progress(self.layout)
+            return
+        node = context.active_node
+        record = record_of(node)
+        if record is not None:
+            _draw_record(self.layout, record, _characters(context))
+            _draw_error(self.layout, node, record, _characters(context))
+        column = self.layout.column()
+        column.operator(LOBEFIT_OT_import_measured.bl_idname, icon="IMPORT")
+        column.operator(LOBEFIT_OT_add_live.bl_idname, icon="ADD")
+
+
 def _draw_result(layout: Any, result: dict[str, Any], characters: int) -> None:
     frames = ", ".join(map(str, result["frames"]))
     sentence = (
@@ -141,9 +168,9 @@ def draw_problem(layout: Any, context: bpy.types.Context) -> None:
 
 def draw_progress(layout: Any) -> None:
     """A bar with what is being fitted, and the way to end it."""
-    batch = current().batch
+    run = current()
     row = layout.row(align=True)
-    row.progress(factor=batch.progress, text=batch.text)
+    row.progress(factor=run.progress, text=run.text)
     row.operator(LOBEFIT_OT_cancel_fit.bl_idname, text="", icon="X")
 
 
@@ -242,11 +269,13 @@ def register() -> None:
     bpy.utils.register_class(LOBEFIT_PT_measured_brdf)
     bpy.utils.register_class(LOBEFIT_PT_import_measured)
     bpy.utils.register_class(LOBEFIT_PT_simplify_scene)
+    bpy.utils.register_class(LOBEFIT_PT_shader_editor)
     bpy.types.STATUSBAR_HT_header.append(_draw_status)
 
 
 def unregister() -> None:
     bpy.types.STATUSBAR_HT_header.remove(_draw_status)
+    bpy.utils.unregister_class(LOBEFIT_PT_shader_editor)
     bpy.utils.unregister_class(LOBEFIT_PT_simplify_scene)
     bpy.utils.unregister_class(LOBEFIT_PT_import_measured)
     bpy.utils.unregister_class(LOBEFIT_PT_measured_brdf)

@@ -12,6 +12,8 @@ KIND_KEY, COUNT_KEY = "lobefit_kind", "lobefit_closures"
 BOUNCES_KEY = "lobefit_diffuse_bounces"
 # What a simplified material showed before, as the options of `fill_material`.
 BEFORE_KEY = "lobefit_before"
+# The last result of simplifying a scene, kept with the scene.
+RESULT_KEY = "lobefit_simplified"
 
 
 def active_material(context: bpy.types.Context) -> bpy.types.Material | None:
@@ -26,5 +28,18 @@ def record_of(material: bpy.types.Material | None) -> dict[str, Any] | None:
     """The entries of the record (RECORD.json) in a material, or None if it has none to be read."""
     try:
         return json.loads(material[KEY])
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def is_simplified(material: bpy.types.Material) -> bool:
+    """Whether the material can be shown again as before it was simplified."""
+    return BEFORE_KEY in material and KEY in material
+
+
+def result_of(scene: bpy.types.Scene) -> dict[str, Any] | None:
+    """The last result of simplifying a scene, or None if there is none to be read."""
+    try:
+        return json.loads(scene[RESULT_KEY])
     except (KeyError, TypeError, ValueError):
         return None

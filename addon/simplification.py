@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .records import KEY
+from .records import KEY, RESULT_KEY, is_simplified
 from .scene import render_seconds
 from .scene_budget import BOUNCE_TOLERANCE, Decision, Subject, choose_ways
 from .scene_view import lights, shown_only_in_renders
@@ -22,14 +22,11 @@ from .swaps import (
     has_bounces,
     is_as_built,
     is_named,
-    is_simplified,
     problem_of,
     restore,
     show,
 )
 from .ways import Way, albedo_of, ways_of
-
-RESULT_KEY = "lobefit_simplified"
 
 
 def simplify(
@@ -92,14 +89,6 @@ def _restored(material: bpy.types.Material) -> str:
     except (ValueError, TypeError):
         return "its record does not hold what it showed"
     return ""
-
-
-def result_of(scene: bpy.types.Scene) -> dict[str, Any] | None:
-    """The last result for a scene, or None if there is none to be read."""
-    try:
-        return json.loads(scene[RESULT_KEY])
-    except (KeyError, TypeError, ValueError):
-        return None
 
 
 def _subjects(

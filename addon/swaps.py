@@ -4,8 +4,9 @@ from typing import Any
 
 import bpy
 
-from .nodes.material import BAKED, build_material, fill_material
-from .records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KEY, KIND_KEY
+from .locks import lock_of
+from .nodes.material import BAKED, build_material, discard, fill_material
+from .records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KIND_KEY, is_simplified
 from .ways import Way
 
 _COMPARED = ".lobefit as built"  # a material that is there only to be compared with
@@ -16,13 +17,10 @@ _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 def problem_of(material: bpy.types.Material) -> str:
     """Why a material has to be left as it is; empty for one that may be changed."""
-    if material.library is not None:
-        return "it is linked from another file"
-    if not material.is_editable:
-        return "it cannot be edited"
-    if material.node_tree.animation_data is not None:
-        return "its nodes are animated"
-    return ""
+    reason = lock_of(material)
+    if not reason and material.node_tree.animation_data is not None:
+        reason = "its nodes are animated"
+    return reason
 
 
 def has_bounces(material: bpy.types.Material) -> bool:
@@ -51,10 +49,7 @@ def is_as_built(material: bpy.types.Material, record: Any, way: Way) -> bool:
     try:
         return tree_content(built.node_tree) == tree_content(material.node_tree)
     finally:
-        bpy.data.materials.remove(built)
-        for group in list(bpy.data.node_groups):
-            if group.session_uid not in groups:
-                bpy.data.node_groups.remove(group)
+        discard({built.session_uid}, groups)
 
 
 def tree_content(tree: bpy.types.NodeTree) -> tuple[Any, ...]:
@@ -114,11 +109,6 @@ def show(
     fill_material(material, record, **after)
     if before != after:
         material[BEFORE_KEY] = before
-
-
-def is_simplified(material: bpy.types.Material) -> bool:
-    """Whether the material can be shown again as before it was simplified."""
-    return BEFORE_KEY in material and KEY in material
 
 
 def restore(material: bpy.types.Material, record: Any) -> None:

@@ -1,6 +1,6 @@
 """A record as a Blender material."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +59,52 @@ def fill_material(
     `lobefit_record`, and what was chosen in `lobefit_kind` and `lobefit_closures`.
     """
     _fill(material, record, choose(record, kind, count, tolerance), diffuse_bounces)
+
+
+def discard(materials: Collection[int], groups: Collection[int]) -> None:
+    """Removes these materials, and the groups of the file that nothing uses but for these groups.
+
+    Both are told by `session_uid`, so that it does no harm where they are gone already.
+    """
+    for material in list(bpy.data.materials):
+        if material.session_uid in materials:
+            bpy.data.materials.remove(material)
+    for group in list(bpy.data.node_groups):
+        if group.users == 0 and group.session_uid not in groups:
+            bpy.data.node_groups.remove(group)
+
+
+def add_to_tree(
+    tree: bpy.types.NodeTree,
+    record: Any,
+    location: tuple[float, float],
+    kind: str = "live",
+    count: int | None = None,
+    tolerance: float = TOLERANCE,
+) -> bpy.types.Node:
+    """Adds what Cycles shows of a `lobefit.Record` to a tree that is there, alone selected.
+
+    The options are those of `build_material`. Nothing is linked. Returns the node whose shader it
+    is; the record and what was chosen go along in its custom properties, as with a material.
+    """
+    choice = choose(record, kind, count, tolerance)
+    for node in tree.nodes:
+        node.select = False
+    if choice.kind == "principled":
+        shader = principled_node(tree, record.principled).outputs[0]
+    else:
+        shader = _add_own_shader(tree, record.name, record, choice)
+    added = [node for node in tree.nodes if node.select]
+    first = added[0].location.copy()
+    for node in added:
+        node.location = [
+            place + old - start
+            for place, old, start in zip(location, node.location, first, strict=True)
+        ]
+    shader.node[KEY] = record.to_json()
+    shader.node[KIND_KEY], shader.node[COUNT_KEY] = choice.kind, choice.count
+    tree.nodes.active = shader.node
+    return shader.node
 
 
 @dataclass(frozen=True)
@@ -140,11 +186,7 @@ def _fill(material: bpy.types.Material, record: Any, choice: Choice, diffuse_bou
     tree = empty_shader_tree(material)
     principled = principled_node(tree, record.principled, location=(0.0, 0.0))
     _add_output(tree, "ALL", principled.outputs[0], (500.0, 0.0)).is_active_output = True
-    shader = None
-    if choice.kind == "live":
-        shader = _add_live(tree, record.parameters)
-    elif choice.closures is not None:
-        shader = _add_baked(tree, f"{material.name} {choice.kind}", choice.closures)
+    shader = _add_own_shader(tree, material.name, record, choice)
     if shader is not None:
         if diffuse_bounces:
             shader = _add_bounces(tree, f"{material.name} bounces", record, shader)
@@ -154,6 +196,17 @@ def _fill(material: bpy.types.Material, record: Any, choice: Choice, diffuse_bou
     material[BOUNCES_KEY] = diffuse_bounces and shader is not None
     # A material that is filled anew has nothing to go back to.
     material.pop(BEFORE_KEY, None)
+
+
+def _add_own_shader(
+    tree: bpy.types.NodeTree, name: str, record: Any, choice: Choice
+) -> bpy.types.NodeSocket | None:
+    """What Cycles shows instead of the Principled BSDF; None where it shows that."""
+    if choice.kind == "live":
+        return _add_live(tree, record.parameters)
+    if choice.closures is not None:
+        return _add_baked(tree, f"{name} {choice.kind}", choice.closures)
+    return None
 
 
 def _add_bounces(

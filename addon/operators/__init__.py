@@ -2,7 +2,8 @@
 
 import bpy
 
-from . import export, library, preview
+from . import add_live, export, library, preview
+from .add_live import LOBEFIT_OT_add_live
 from .classic import LOBEFIT_OT_make_classic, LOBEFIT_OT_take_lights
 from .export import LOBEFIT_OT_export_measured
 from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
@@ -14,6 +15,7 @@ from .simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 _CLASSES = (
     LOBEFIT_OT_import_measured,
     LOBEFIT_FH_measured,
+    LOBEFIT_OT_add_live,
     LOBEFIT_OT_fit,
     LOBEFIT_OT_cancel_fit,
     LOBEFIT_OT_simplify_scene,
@@ -30,6 +32,7 @@ _ENTRIES = (
     ("TOPBAR_MT_file_import", draw_menu),
     ("TOPBAR_MT_file_import", library.draw_import_menu),
     ("TOPBAR_MT_file_export", export.draw_menu),
+    ("NODE_MT_shader_node_add_all", add_live.draw_menu),
     ("ASSETBROWSER_MT_catalog", library.draw_catalog_menu),
 )
 

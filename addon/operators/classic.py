@@ -1,9 +1,10 @@
 """Classic materials, and the lights that they are told."""
 
+import math
+import operator
 from typing import Any, ClassVar, NamedTuple
 
 import bpy
-import numpy as np
 from mathutils import Vector
 
 from ..nodes.classic import LIGHTS, NAME, classic_group, is_classic, light_socket
@@ -15,8 +16,8 @@ class Light(NamedTuple):
     """A light as the group takes it: the direction toward it, i_d and i_s (linear RGB)."""
 
     direction: Vector
-    diffuse: np.ndarray
-    specular: np.ndarray
+    diffuse: Vector
+    specular: Vector
 
 
 class LOBEFIT_OT_make_classic(bpy.types.Operator):
@@ -94,36 +95,36 @@ def suns_of(context: bpy.types.Context) -> list[Light]:
 def _light(sun: bpy.types.Object) -> Light:
     """Such that the diffuse term shows what Cycles' diffuse closure shows of the sun."""
     data = sun.data
-    colour = np.array(data.color)
+    colour = Vector(data.color)
     # Lamps have an exposure and a temperature since Blender 4.5.
     if getattr(data, "use_temperature", False):
-        colour = colour * data.temperature_color
-    radiance = colour * (data.energy * 2 ** getattr(data, "exposure", 0.0) / np.pi)
+        colour = Vector(map(operator.mul, colour, data.temperature_color))
+    radiance = colour * (data.energy * 2 ** getattr(data, "exposure", 0.0) / math.pi)
     direction = sun.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0))
     return Light(
         direction.normalized(), radiance * data.diffuse_factor, radiance * data.specular_factor
     )
 
 
-def _world_radiance(world: bpy.types.World | None) -> np.ndarray | None:
+def _world_radiance(world: bpy.types.World | None) -> Vector | None:
     """What comes from everywhere; None where that differs from direction to direction."""
     if world is None:
-        return np.zeros(3)
+        return Vector()
     # Since Blender 5.0 every world has nodes, and asking whether it uses them is deprecated.
     if bpy.app.version < (5, 0) and not world.use_nodes:
-        return np.array(world.color)
+        return Vector(world.color)
     output = world.node_tree.get_output_node("CYCLES")
     if output is None or not output.inputs["Surface"].is_linked:
-        return np.zeros(3)
+        return Vector()
     node = output.inputs["Surface"].links[0].from_node
     if node.type != "BACKGROUND" or any(socket.is_linked for socket in node.inputs):
         return None
     colour, strength = (node.inputs[name].default_value for name in ("Color", "Strength"))
-    return np.array(colour[:3]) * strength
+    return Vector(colour[:3]) * strength
 
 
 def _take_lights(
-    operator: bpy.types.Operator, context: bpy.types.Context, nodes: list[bpy.types.Node]
+    reporter: bpy.types.Operator, context: bpy.types.Context, nodes: list[bpy.types.Node]
 ) -> None:
     suns, ambient = suns_of(context), _world_radiance(context.scene.world)
     for node in nodes:
@@ -133,10 +134,10 @@ def _take_lights(
             node.inputs["Ambient Light"].default_value = (*ambient, 1.0)
     if len(suns) > LIGHTS:
         text = f"The {LIGHTS} brightest of {len(suns)} suns were taken"
-        operator.report({"WARNING"}, text)
+        reporter.report({"WARNING"}, text)
     if ambient is None:
         text = "Ambient Light is left as it was: the world is not of one colour"
-        operator.report({"WARNING"}, text)
+        reporter.report({"WARNING"}, text)
 
 
 def _set_light(node: bpy.types.Node, index: int, light: Light | None) -> None:

@@ -1,16 +1,18 @@
 """File > Export > Measured BRDFs: what the measured materials of the open file hold."""
 
-import tempfile
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from .. import native
-from ..child import Child
 from ..records import KEY
 from .run import RunsWork
+
+# What starts processes is loaded when it is used, so that Blender starts as soon as before.
+if TYPE_CHECKING:
+    from ..child import Child
 
 _KINDS = ("records", "csv", "gltf", "usd")
 
@@ -58,6 +60,10 @@ class LOBEFIT_OT_export_measured(RunsWork, bpy.types.Operator):
         kinds = [f"--{kind}" for kind in _KINDS if getattr(self, kind)]
         if not self.directory or not kinds:
             return self.refuse("Expected a folder and what to write to it, found none chosen.")
+        import tempfile
+
+        from ..child import Child
+
         # The other Blender reads a file of the materials as they are now, saved or not.
         self._folder = tempfile.TemporaryDirectory(prefix="lobefit-")
         blend = str(Path(self._folder.name) / "materials.blend")
@@ -65,7 +71,7 @@ class LOBEFIT_OT_export_measured(RunsWork, bpy.types.Operator):
         folder = bpy.path.abspath(self.directory)
         return self.start(context, Child(["export", blend, *kinds, "--json", "-o", folder]))
 
-    def conclude(self, context: bpy.types.Context, work: Child) -> set[str]:
+    def conclude(self, context: bpy.types.Context, work: "Child") -> set[str]:
         self._folder.cleanup()
         for problem in work.problems:
             self.report({"WARNING" if work.results else "ERROR"}, problem)

@@ -1,5 +1,6 @@
 """Fits the active material anew, and cancels a fit."""
 
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -7,6 +8,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..jobs import Outcome
+from ..locks import lock_of
 from ..nodes.material import fill_material
 from ..records import active_material, record_of
 from .import_measured import MEASURED_GLOB
@@ -34,8 +36,9 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         if record_of(material) is None:
             cls.poll_message_set("The active material was not made from a measurement")
             return False
-        if not material.is_editable:
-            cls.poll_message_set("The active material is linked from another file")
+        reason = lock_of(material)
+        if reason:
+            cls.poll_message_set(f"The active material cannot be fitted anew: {reason}")
             return False
         return super().poll(context)
 
@@ -56,7 +59,8 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         self._material_uid = material.session_uid
         return self.fit(context, [path])
 
-    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> str:
+    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> Generator[None, None, str]:
+        yield
         found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
         if not found:
             return "The material was removed while its fit was under way."

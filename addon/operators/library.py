@@ -1,16 +1,19 @@
 """Asset libraries: made of measured files by another Blender, and told to the preferences."""
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from .. import native
-from ..child import Child
 from ..properties import LibraryOptions, draw_library_options
 from .import_measured import MEASURED_GLOB, ChoosesFiles
 from .run import RunsWork
+
+# What starts processes is loaded when it is used, so that Blender starts as soon as before.
+if TYPE_CHECKING:
+    from ..child import Child
 
 _made: list[Path] = []  # the folders of libraries that were made, as long as Blender runs
 
@@ -39,6 +42,8 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
         problem = native.problem()
         if problem:
             return self.refuse(problem)
+        from ..child import Child
+
         # Where no file was chosen, the folder was.
         sources = self.chosen() or [Path(bpy.path.abspath(self.directory))]
         if not sources[0].name:
@@ -47,7 +52,7 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
         library = bpy.path.abspath(self.library) or str(folder / f"{folder.name}.blend")
         return self.start(context, Child(self.command(list(map(str, sources)), library)))
 
-    def conclude(self, context: bpy.types.Context, work: Child) -> set[str]:
+    def conclude(self, context: bpy.types.Context, work: "Child") -> set[str]:
         made = [result for result in work.results if "library" in result]
         for problem in work.problems:
             self.report({"WARNING" if made else "ERROR"}, problem)

@@ -1,14 +1,17 @@
 """Shows a measurement beside the material that was made of it, without rendering."""
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 import bpy.utils.previews
-import numpy as np
 
 from .. import native
 from ..nodes.material import shown_by
 from ..records import KEY, active_material, record_of
+
+# NumPy is loaded when it is used: it would double the time that Blender takes to start.
+if TYPE_CHECKING:
+    import numpy as np
 
 IMAGE = "Lobefit Preview"
 COLUMNS = {"measured": "Measured", "cycles": "As in Cycles", "difference": "Error x4"}
@@ -37,6 +40,7 @@ class LOBEFIT_OT_preview(bpy.types.Operator):
             self.report({"ERROR"}, problem)
             return {"CANCELLED"}
         import lobefit
+        import numpy as np
         from lobefit import preview
 
         material = active_material(context)
@@ -80,14 +84,16 @@ def _key(material: bpy.types.Material, name: str) -> str:
     return f"{material.session_uid} {name}"
 
 
-def _with_alpha(picture: np.ndarray) -> np.ndarray:
+def _with_alpha(picture: "np.ndarray") -> "np.ndarray":
     """An sRGB picture with its rows from the top as Blender wants it: from below, and opaque."""
+    import numpy as np
+
     pixels = np.ones((*picture.shape[:2], 4), np.float32)
     pixels[..., :3] = picture[::-1]
     return pixels
 
 
-def _fill_image(pixels: np.ndarray) -> None:
+def _fill_image(pixels: "np.ndarray") -> None:
     rows, columns = pixels.shape[:2]
     image = bpy.data.images.get(IMAGE) or bpy.data.images.new(IMAGE, columns, rows)
     if tuple(image.size) != (columns, rows):
@@ -96,7 +102,7 @@ def _fill_image(pixels: np.ndarray) -> None:
     image.pack()
 
 
-def _fill_icon(key: str, pixels: np.ndarray) -> None:
+def _fill_icon(key: str, pixels: "np.ndarray") -> None:
     icon = _icons[key] if key in _icons else _icons.new(key)
     icon.image_size = pixels.shape[1], pixels.shape[0]
     icon.image_pixels_float.foreach_set(pixels.ravel())

@@ -1,15 +1,17 @@
 """Leaves out of the scene's measured materials what it does not need, and puts it back."""
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import bpy
 
 from .. import native
 from ..properties import SimplifyOptions
-from ..simplification import restore_all, simplify
-from ..survey import Survey
-from ..swaps import is_simplified
+from ..records import is_simplified
 from .run import RunsWork, current
+
+# What needs NumPy is loaded when it is used: it would double the time that Blender takes to start.
+if TYPE_CHECKING:
+    from ..survey import Survey
 
 
 class LOBEFIT_OT_simplify_scene(SimplifyOptions, RunsWork, bpy.types.Operator):
@@ -26,12 +28,16 @@ class LOBEFIT_OT_simplify_scene(SimplifyOptions, RunsWork, bpy.types.Operator):
         problem = native.problem()
         if problem:
             return self.refuse(problem)
+        from ..survey import Survey
+
         survey = Survey(context, self.frames)
         if survey.problem:
             return self.refuse(survey.problem)
         return self.start(context, survey)
 
-    def conclude(self, context: bpy.types.Context, work: Survey) -> set[str]:
+    def conclude(self, context: bpy.types.Context, work: "Survey") -> set[str]:
+        from ..simplification import simplify
+
         if work.problem:
             return self.refuse(work.problem)
         result = simplify(context, work, self.tolerance / 100, self.diffuse_bounces, self.timed)
@@ -70,6 +76,8 @@ class LOBEFIT_OT_restore_scene(bpy.types.Operator):
         if problem:
             self.report({"ERROR"}, problem)
             return {"CANCELLED"}
+        from ..simplification import restore_all
+
         result = restore_all()
         for item in result["skipped"]:
             self.report({"WARNING"}, f"{item['material']}: left as it is, {item['reason']}")

@@ -11,6 +11,7 @@ import pytest
 
 OPERATORS = [
     "add_asset_library",
+    "add_live",
     "cancel_fit",
     "copy_diagnostics",
     "export_measured",
@@ -58,6 +59,9 @@ class Recorder:
         assert 0 <= factor <= 1
         self.texts.append(text)
 
+    def separator(self):
+        pass
+
     def template_icon(self, icon_value, scale):
         # Without a window there are no icons, and their number is 0.
         assert icon_value >= 0 and scale > 0
@@ -85,23 +89,56 @@ def native(addon):
     addon.native.problem.cache_clear()
 
 
-def test_registering_again_leaves_nothing(addon):
-    def ours():
-        names = ("MT_file_import", "MT_file_export")
-        drawn = [getattr(bpy.types, f"TOPBAR_{name}") for name in names]
-        drawn += [bpy.types.STATUSBAR_HT_header, bpy.types.ASSETBROWSER_MT_catalog]
-        functions = [f.__module__ for menu in drawn for f in menu.draw._draw_funcs]
-        types = [name for name in dir(bpy.types) if name.startswith("LOBEFIT_")]
-        return types, [name for name in functions if name.startswith(addon.__name__)]
+def drawing_functions():
+    """The functions that each of Blender's menus, headers and panels was given by add-ons."""
+    for name in dir(bpy.types):
+        draw = getattr(getattr(bpy.types, name), "draw", None)
+        yield from getattr(draw, "_draw_funcs", [])
 
-    before = ours()
+
+def ours(addon):
+    """All that Blender knows of the extension, by where it is kept."""
+
+    def of_us(functions):
+        return sorted(f"{f.__module__}.{f.__qualname__}" for f in functions if _is_of(addon, f))
+
+    handlers = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers))
+    keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
+    owners = (bpy.types.WindowManager, bpy.types.Scene, bpy.types.Material, bpy.types.Object)
+    return {
+        "types": [name for name in dir(bpy.types) if name.startswith("LOBEFIT_")],
+        "operators": dir(bpy.ops.lobefit),
+        "drawn": of_us(drawing_functions()),
+        "handlers": of_us(f for found in handlers if isinstance(found, list) for f in found),
+        "keys": [item.idname for keymap in keymaps for item in keymap.keymap_items],
+        "properties": [name for owner in owners for name in dir(owner) if "lobefit" in name],
+    }
+
+
+def _is_of(addon, function):
+    return (function.__module__ or "").startswith(addon.__name__)
+
+
+def test_registering_again_leaves_nothing(addon):
+    before = ours(addon)
+    keys = before["keys"]
+    assert before["operators"] == OPERATORS and before["drawn"]
+    nothing = {name: [] for name in before} | {"keys": keys}
     for _ in range(10):
         addon.unregister()
-        assert ours() == ([], [])
-        assert dir(bpy.ops.lobefit) == []
+        assert ours(addon) == nothing
         addon.register()
-    assert ours() == before
-    assert sorted(dir(bpy.ops.lobefit)) == OPERATORS
+    assert ours(addon) == before
+    assert not any("lobefit" in key for key in keys) and not before["handlers"]
+
+
+def test_enabling_again_leaves_nothing(addon):
+    before = ours(addon)
+    for _ in range(3):
+        bpy.ops.preferences.addon_disable(module=addon.__name__)
+        assert ours(addon) == {name: [] for name in before} | {"keys": before["keys"]}
+        bpy.ops.preferences.addon_enable(module=addon.__name__)
+    assert ours(addon) == before
 
 
 def test_unregister_ends_a_fit(addon, measured_file):
@@ -154,14 +191,14 @@ def test_panel_shows_the_preview(addon, material):
     assert titles[0] not in draw_panel(material=bpy.data.materials.new("other")).texts
 
 
-def drawn(panel):
-    """A panel of the Render tab, drawn."""
+def drawn(panel, context=None):
+    """A panel, drawn."""
 
     class Drawn(SimpleNamespace):
         draw = panel.draw
 
     layout = Recorder()
-    Drawn(layout=layout).draw(bpy.context)
+    Drawn(layout=layout).draw(context or bpy.context)
     return layout
 
 
@@ -215,6 +252,32 @@ def test_panel_of_the_scene(addon, material):
     assert layout.operators == ["simplify_scene", "restore_scene"]
     assert layout.properties == ["tolerance", "frames", "diffuse_bounces", "timed"]
     assert f"{material.name}: live > principled" in layout.texts
+
+
+def test_panel_of_the_shader_editor(addon, measured_file):
+    panel, tree = bpy.types.LOBEFIT_PT_shader_editor, bpy.data.materials.new("plain").node_tree
+    tree = tree or bpy.data.node_groups.new("tree", "ShaderNodeTree")
+    node = addon.nodes.material.add_to_tree(tree, lobefit.fit(measured_file), (0, 0))
+    members = {name: getattr(bpy.context, name) for name in ("region", "preferences")}
+    empty = drawn(panel, SimpleNamespace(active_node=None, **members))
+    assert empty.operators == ["import_measured", "add_live"] and not empty.texts
+    layout = drawn(panel, SimpleNamespace(active_node=node, **members))
+    assert layout.operators == empty.operators
+    assert "% of the reflected light" in " ".join(layout.texts)
+
+
+def test_every_panel_and_menu_entry_is_drawn(addon):
+    """Those of the extension, so that none is forgotten in this file."""
+    panels = [name for name in dir(bpy.types) if name.startswith("LOBEFIT_PT_")]
+    known = ("measured_brdf", "import_measured", "simplify_scene", "shader_editor")
+    assert panels == sorted(f"LOBEFIT_PT_{name}" for name in known)
+    space = SimpleNamespace(
+        type="NODE_EDITOR", tree_type="ShaderNodeTree", shader_type="OBJECT", params=None
+    )
+    for function in filter(lambda function: _is_of(addon, function), drawing_functions()):
+        layout = Recorder()
+        function(SimpleNamespace(layout=layout), SimpleNamespace(space_data=space))
+        assert layout.operators or function.__name__ == "_draw_status"
 
 
 def test_without_the_compiled_module(native, monkeypatch, measured_file):

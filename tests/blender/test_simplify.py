@@ -373,7 +373,7 @@ def test_other_renderers_see_no_change(two_spheres):
 
 def test_the_result_is_kept(simplification, two_spheres):
     bpy.ops.lobefit.simplify_scene(tolerance=2)
-    result = simplification.result_of(bpy.context.scene)
+    result = records.result_of(bpy.context.scene)
     assert result == json.loads(json.dumps(result))
     metal, rubber = result["materials"]
     assert metal["before"] == {"kind": "measured", "count": 3, "cost": 3.25}
@@ -391,7 +391,7 @@ def test_rendering_is_timed(simplification, two_spheres):
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
     bpy.ops.lobefit.simplify_scene(tolerance=10, timed=True)
-    seconds = simplification.result_of(scene)["seconds"]
+    seconds = records.result_of(scene)["seconds"]
     assert seconds["before"] > 0 and seconds["after"] > 0
     assert scene.render.resolution_percentage == 100
 
@@ -425,7 +425,7 @@ def test_bounces_of_a_material_are_put_back(addon, swaps, records, two_spheres):
 
 def skipped(simplification):
     """The reasons by material, of the scene as it is."""
-    found = simplification.result_of(bpy.context.scene)["skipped"]
+    found = records.result_of(bpy.context.scene)["skipped"]
     return {item["material"]: item["reason"] for item in found}
 
 
@@ -512,7 +512,7 @@ def test_of_entries_with_as_many_closures_the_shown_one_is_found(simplification,
     two["specular"] = [*two["specular"], three["specular"][0]]
     metal["lobefit_record"] = json.dumps(record)
     bpy.ops.lobefit.simplify_scene(tolerance=0)
-    assert simplification.result_of(bpy.context.scene)["materials"][0]["before"]["count"] == 3
+    assert records.result_of(bpy.context.scene)["materials"][0]["before"]["count"] == 3
 
 
 def test_without_closures_or_a_file(addon, two_spheres):

@@ -8,12 +8,17 @@
 Nothing here needs Blender; materials are built from a record by the package `lobefit_addon`.
 """
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from lobefit._native import Cancelled, InputError, Measurement
 from lobefit._native import version as __version__
-from lobefit.classic import ExponentMatch, match_exponent
 from lobefit.fitting import Closures, Job, closures, closures_for, fit, read, start_fit
-from lobefit.phong_energy import Energy, energy
 from lobefit.record import Record
+
+if TYPE_CHECKING:
+    from lobefit.classic import ExponentMatch, match_exponent
+    from lobefit.phong_energy import Energy, energy
 
 __all__ = [
     "Cancelled",
@@ -33,3 +38,18 @@ __all__ = [
     "read",
     "start_fit",
 ]
+
+# What needs NumPy, by its module: loading it takes longer than all the rest, and Blender's window
+# would stand still that long.
+_WITH_NUMPY = {
+    "Energy": "phong_energy",
+    "ExponentMatch": "classic",
+    "energy": "phong_energy",
+    "match_exponent": "classic",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _WITH_NUMPY:
+        raise AttributeError(f"module 'lobefit' has no attribute '{name}'")
+    return getattr(importlib.import_module(f"lobefit.{_WITH_NUMPY[name]}"), name)

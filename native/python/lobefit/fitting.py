@@ -1,7 +1,7 @@
 """Fits in the background: a job to ask for its progress, and calls that wait for one."""
 
-import contextlib
 import dataclasses
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from typing import Any
 
 from lobefit import _native
 from lobefit._native import Cancelled, InputError, Measurement
-from lobefit.origin import Origin, is_unchanged, origin_of
+from lobefit.origin import Origin, OriginSearch, is_unchanged
 from lobefit.record import MODELS, Fit, Record, figure_of, without_nan
 
 Source = str | os.PathLike[str] | Measurement
@@ -22,6 +22,7 @@ MOST_CLOSURES = 3
 TOLERANCE = 0.05
 
 _POLL = 0.05  # seconds between two looks at a job that is waited for
+_SLICE = 0.01  # seconds to spend on the origin where there is no time to wait
 _FIT_KEYS = tuple(Fit.__dataclass_fields__)
 _RECORD_KEYS = ("schedule", "norm", "channels", "max_angle")
 
@@ -112,7 +113,8 @@ class Job:
         else:
             self._source = source if isinstance(source, Measurement) else os.fspath(source)
             self._models = list(MODELS) if model == "all" else [model]
-        self._origin: Origin | None = None
+        from_file = isinstance(self._source, str) and bool(self._models)
+        self._origin = OriginSearch(self._source) if from_file else None
         self._cancelled = False
         self._running: _native.FitJob | _native.ClosureJob | None = None
         self._begin_next()
@@ -142,18 +144,20 @@ class Job:
 
     def wait(self, seconds: float) -> bool:
         """Waits at most `seconds` for the end; says whether it is reached."""
-        if self._running is None:
-            return True
-        # A file that cannot be read is the reader's to tell of, in the threads.
-        with contextlib.suppress(InputError):
-            self._hash_source()
-        if not self._running.wait(seconds):
-            return False
-        if self._cancelled or self._failed():
-            return True
-        self._end_current()
-        self._begin_next()
-        return self._running is None
+        end = time.perf_counter() + seconds
+        known = self._knows_origin(max(seconds, _SLICE))
+        if self._running is not None:
+            if not self._running.wait(max(0.0, end - time.perf_counter())):
+                return False
+            try:
+                result = self._running.result()
+            except Exception:  # which `record` raises
+                return True
+            if self._cancelled:
+                return True
+            self._take(without_nan(result))
+            self._begin_next()
+        return known and self._running is None
 
     def record(self) -> Record:
         """Waits for the end and tells what was found.
@@ -174,14 +178,16 @@ class Job:
 
     def _base_record(self) -> Record:
         if self._record is None:
-            self._hash_source()
-            self._record = _record(self._fitted, self._origin or Origin())
+            origin = self._origin.advance(math.inf) if self._origin else None
+            self._record = _record(self._fitted, origin or Origin())
         return self._record
 
-    def _hash_source(self) -> None:
-        """Learns where the measurement comes from, while the threads are busy with it."""
-        if self._origin is None and isinstance(self._source, str) and self._models:
-            self._origin = origin_of(self._source)
+    def _knows_origin(self, seconds: float) -> bool:
+        """Learns for so long where the measurement comes from, while the threads are busy."""
+        try:
+            return self._origin is None or self._origin.advance(seconds) is not None
+        except InputError:  # the reader's to tell of, in the threads, or else that of `record`
+            return True
 
     def _begin_next(self) -> None:
         self._running = None
@@ -199,15 +205,8 @@ class Job:
                 threads=self._options.get("threads", 0),
             )
 
-    def _failed(self) -> bool:
-        try:
-            self._running.result()
-        except Exception:
-            return True
-        return False
-
-    def _end_current(self) -> None:
-        result = without_nan(self._running.result())
+    def _take(self, result: dict[str, Any]) -> None:
+        """Keeps what the job under way has found."""
         if isinstance(self._running, _native.FitJob):
             result["error_by_angle"] = _rounded(result["error_by_angle"])
             self._fitted.append(result)

@@ -3,7 +3,9 @@
 import csv
 import hashlib
 import io
+import math
 import os
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +15,7 @@ from lobefit import _native
 from lobefit._native import InputError
 from lobefit.atomic import make_folder, reason, write_bytes
 
+_AT_ONCE = 1 << 20  # bytes to hash before looking at the time
 _LIST = "samples.csv"
 _COLUMNS = ("sha256", "file", "name", "source")
 _PAPER = (
@@ -37,13 +40,41 @@ class Origin:
 
 def origin_of(path: str | os.PathLike[str]) -> Origin:
     """The origin of the file `path`; it has a name if a list of samples beside it has its hash."""
-    place = Path(os.path.abspath(path))
-    try:
+    search = OriginSearch(path)
+    while search.advance(math.inf) is None:
+        pass
+    return search.origin
+
+
+class OriginSearch:
+    """Finds the origin of a file a little at a time, as long as Blender's window waits for it."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.origin: Origin | None = None
+        self._path = path
+        self._hash = hashlib.sha256()
+        self._read = 0  # bytes of it that were hashed
+
+    def advance(self, seconds: float) -> Origin | None:
+        """Goes on for about so long; the origin when it is known."""
+        if self.origin is None:
+            try:
+                self._hash_more(time.perf_counter() + seconds)
+            except OSError as error:
+                raise InputError(f"{self._path}: cannot be read, {reason(error)}.") from error
+        return self.origin
+
+    def _hash_more(self, end: float) -> None:
+        place = Path(os.path.abspath(self._path))
         with place.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
-    return Origin(str(place), digest, _listed(place.parent).get(digest, {}).get("name"))
+            file.seek(self._read)
+            while data := file.read(_AT_ONCE):
+                self._hash.update(data)
+                self._read += len(data)
+                if time.perf_counter() > end:
+                    return
+        digest = self._hash.hexdigest()
+        self.origin = Origin(str(place), digest, _listed(place.parent).get(digest, {}).get("name"))
 
 
 def is_unchanged(source: Mapping[str, Any]) -> bool:

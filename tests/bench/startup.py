@@ -1,0 +1,53 @@
+"""What the extension adds to Blender's start: ./dev bench startup [PYTHON ..]
+
+For each Python that has bpy (the one at hand, if none is named), the milliseconds of importing the
+add-on and of `register`, the least of seven fresh processes, whose first one leaves the bytecode as
+Blender does: by the clock and by processor time.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ADDON = Path(__file__).resolve().parents[2] / "addon"
+ROUNDS = 7
+PROGRAM = """
+import os, sys, time
+import bpy
+sys.path.insert(0, sys.argv[1])
+clock, own = time.perf_counter(), time.thread_time()
+import started_addon
+started_addon.register()
+print(bpy.app.version_string.split()[0], time.perf_counter() - clock, time.thread_time() - own)
+started_addon.unregister()
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+def once(python: str, folder: Path) -> tuple[float, float, str]:
+    """Seconds by the clock, by processor time, and the release."""
+    command = [python, "-c", PROGRAM, str(folder)]
+    bytecode = {"PYTHONPYCACHEPREFIX": str(folder / "bytecode"), "PYTHONDONTWRITEBYTECODE": ""}
+    answer = subprocess.run(
+        command, env=os.environ | bytecode, check=True, capture_output=True, text=True
+    )
+    release, clock, own = answer.stdout.splitlines()[-1].split()
+    return float(clock), float(own), release
+
+
+def main() -> None:
+    print("| Blender | ms by the clock | ms of the processor |")
+    print("|---" * 3 + "|")
+    for python in sys.argv[1:] or [sys.executable]:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "started_addon").symlink_to(ADDON)
+            rounds = [once(python, Path(folder)) for _ in range(ROUNDS)]
+        clock, own, release = (min(column) for column in zip(*rounds, strict=True))
+        print(f"| {release} | {clock * 1e3:.1f} | {own * 1e3:.1f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""What becomes of files that are dropped on the editors, and that each drop is one undo step."""
+
+import pytest
+from window import HEIGHT, FileBrowser
+
+STATE = """
+import bl_ext.user_default.lobefit as lobefit
+measured = [m for m in bpy.data.materials if 'lobefit_record' in m]
+cube = bpy.data.objects['Cube']
+result = {
+    'idle': lobefit.operators.run.current() is None,
+    'kept': sorted(m.name for m in measured if m.use_fake_user),
+    'slots': [slot.material and slot.material.name for slot in cube.material_slots],
+}
+"""
+CUBE = """
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+area = next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == 'VIEW_3D')
+region = next(r for r in area.regions if r.type == 'WINDOW')
+place = location_3d_to_region_2d(region, area.spaces.active.region_3d, (0, 0, 0))
+result = [region.x + place.x, region.y + place.y]
+"""
+
+
+@pytest.fixture(scope="module")
+def files(shared):
+    return FileBrowser(shared)
+
+
+@pytest.fixture
+def cube(shared, files):
+    """Where the cube is on the display; there is no measured material yet."""
+    shared.ask(
+        "for m in list(bpy.data.materials):\n"
+        "    if m.name != 'Material': bpy.data.materials.remove(m)\n"
+        "bpy.data.objects['Cube'].material_slots[0].material = bpy.data.materials['Material']\n"
+        "bpy.ops.ed.undo_push()"
+    )
+    x, y = shared.ask(CUBE)
+    return x, HEIGHT - y
+
+
+def settled(window):
+    """How things stand when nothing is fitted any more."""
+    window.wait_for("bool(bpy.context)")
+    while not (state := window.ask(STATE))["idle"]:
+        pass
+    return {key: state[key] for key in ("kept", "slots")}
+
+
+def undone(window, place):
+    """The same after one step was undone."""
+    window.move(place)
+    window.key("ctrl+z")
+    return settled(window)
+
+
+BEFORE = {"kept": [], "slots": ["Material"]}
+
+
+def test_on_an_object(shared, files, cube):
+    shared.drag(files.place("nickel.binary"), cube, picture="drop_on_an_object")
+    assert settled(shared) == {"kept": [], "slots": ["nickel"]}
+    assert undone(shared, cube) == BEFORE
+
+
+def test_beside_all_objects(shared, files, cube):
+    shared.drag(files.place("nickel.binary"), (cube[0] + 300, cube[1]))
+    assert settled(shared) == {"kept": ["nickel"], "slots": ["Material"]}
+    assert undone(shared, cube) == BEFORE
+
+
+def test_several_files(shared, files, cube):
+    shared.click(files.place("nickel.binary"))
+    shared.click_too(files.place("violet-rubber.binary"))
+    shared.drag(files.place("violet-rubber.binary"), cube)
+    state = settled(shared)
+    shared.shot("several_files")
+    assert state == {"kept": ["nickel", "violet-rubber"], "slots": ["Material"]}
+    shared.key("Escape")
+    assert undone(shared, (cube[0] + 300, cube[1])) == BEFORE
+
+
+def test_on_the_material_tab(shared, files, cube):
+    shared.ask(
+        "areas = bpy.context.window_manager.windows[0].screen.areas\n"
+        "space = next(a for a in areas if a.type == 'PROPERTIES').spaces.active\n"
+        "space.context = 'MATERIAL'"
+    )
+    left, top, width, height = shared.area("PROPERTIES")
+    shared.drag(files.place("nickel.binary"), (left + width * 0.6, top + height * 0.8))
+    assert settled(shared) == {"kept": [], "slots": ["nickel"]}
+    shared.shot("drop_on_the_material_tab")
+
+
+def test_on_the_shader_editor(shared, files, cube):
+    shared.ask(
+        "areas = bpy.context.window_manager.windows[0].screen.areas\n"
+        "next(a for a in areas if a.type == 'VIEW_3D').ui_type = 'ShaderNodeTree'"
+    )
+    left, top, width, height = shared.area("NODE_EDITOR")
+    place = left + width // 2, top + height // 2
+    shared.drag(files.place("nickel.binary"), place)
+    assert settled(shared) == BEFORE
+    shared.shot("drop_on_the_shader_editor")
+    found, expected = shared.ask(
+        "nodes = bpy.data.materials['Material'].node_tree.nodes\n"
+        "node = next(n for n in nodes if 'lobefit_record' in n)\n"
+        "areas = bpy.context.window_manager.windows[0].screen.areas\n"
+        "area = next(a for a in areas if a.type == 'NODE_EDITOR')\n"
+        "region = next(r for r in area.regions if r.type == 'WINDOW')\n"
+        f"x, y = {place[0]} - region.x, {HEIGHT - place[1]} - region.y\n"
+        "result = [list(node.location), list(region.view2d.region_to_view(x, y))]"
+    )
+    # The mouse is at whole pixels, and a node's size goes with that of the interface.
+    assert found == pytest.approx(expected, abs=5)

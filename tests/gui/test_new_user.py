@@ -1,0 +1,62 @@
+"""From the zip of the extension and a measured file to a rendered picture, by mouse alone."""
+
+import time
+
+import pytest
+from window import FileBrowser
+
+MEASURED = """
+[material.name for material in bpy.data.materials if 'lobefit_record' in material]
+"""
+
+
+def test_from_the_zip_to_a_picture(window):
+    """Prints how many clicks and seconds each step took (pytest -s)."""
+    began, clicked = time.monotonic(), 0
+
+    def tell(step):
+        nonlocal began, clicked
+        clicks, seconds = window.clicks - clicked, time.monotonic() - began
+        window.shot(step.replace(" ", "_"))
+        print(f"{step}: {clicks} clicks, {seconds:.1f} s")
+        began, clicked = time.monotonic(), window.clicks
+
+    tell("the start")
+    window.click((1100, 300))  # beside the splash screen
+    files = FileBrowser(window)
+    tell("a file browser")
+    (package,) = window.downloads.glob("*.zip")
+    window.drag(files.place(package.name), (300, 420))
+    time.sleep(2)
+    window.shot("the_question_of_the_installation")
+    window.click((330, 513))
+    window.wait_for("hasattr(bpy.types, 'LOBEFIT_OT_import_measured')")
+    tell("installed")
+    window.drag(files.place("nickel.binary"), (662, 288), picture="the_drop")
+    time.sleep(0.5)
+    window.shot("the_fit")
+    assert window.wait_for(MEASURED.strip()) == ["nickel"]
+    assert window.ask("result = bpy.data.objects['Cube'].active_material.name") == "nickel"
+    time.sleep(1)
+    tell("a material")
+    window.click((1339, 418))  # the Render tab
+    window.click((1500, 417))  # EEVEE
+    window.click((1484, 485))  # Cycles
+    assert window.ask("result = bpy.context.scene.render.engine") == "CYCLES"
+    tell("Cycles")
+    window.click((1339, 783))  # the Material tab
+    time.sleep(2)
+    tell("the panel")
+    window.move((300, 420))
+    window.key("F12")
+    window.clicks += 1
+    window.wait_for(
+        "bpy.app.is_job_running('RENDER') or len(bpy.context.window_manager.windows) > 1"
+    )
+    window.wait_for("not bpy.app.is_job_running('RENDER')")
+    time.sleep(2)
+    tell("a picture")
+
+
+if __name__ == "__main__":
+    pytest.main([__file__, "-s"])
