@@ -259,7 +259,10 @@ def _open(path: str | os.PathLike[str]) -> None:
 
     with quiet():
         try:
-            bpy.ops.wm.open_mainfile(filepath=str(Path(path).absolute()), load_ui=False)
+            # A file may be a stranger's: its scripts and drivers stay what they are, data.
+            bpy.ops.wm.open_mainfile(
+                filepath=str(Path(path).absolute()), load_ui=False, use_scripts=False
+            )
         except RuntimeError as error:
             raise InputError(
                 f"{path}: expected a Blender file, found one that cannot be opened "

@@ -11,7 +11,7 @@ from typing import Any
 
 from lobefit import _native
 from lobefit._native import Cancelled, InputError, Measurement
-from lobefit.origin import Origin, is_unchanged, origin_of
+from lobefit.origin import Origin, origin_of, read_unchanged, stamp_of
 from lobefit.record import MODELS, Fit, Record, figure_of, without_nan
 
 Source = str | os.PathLike[str] | Measurement
@@ -112,6 +112,7 @@ class Job:
         else:
             self._source = source if isinstance(source, Measurement) else os.fspath(source)
             self._models = list(MODELS) if model == "all" else [model]
+            self._stamp = None if isinstance(source, Measurement) else stamp_of(self._source)
         self._origin: Origin | None = None
         self._cancelled = False
         self._running: _native.FitJob | _native.ClosureJob | None = None
@@ -183,6 +184,15 @@ class Job:
         if self._origin is None and isinstance(self._source, str) and self._models:
             self._origin = origin_of(self._source)
 
+    def _check_source(self) -> None:
+        """Raises InputError where what was read and what the record will name may differ."""
+        self._hash_source()
+        if isinstance(self._source, str) and stamp_of(self._source) != self._stamp:
+            raise InputError(
+                f"{self._source}: expected a file that stays as it is while it is fitted, found "
+                "that it changed."
+            )
+
     def _begin_next(self) -> None:
         self._running = None
         if len(self._fitted) < len(self._models):
@@ -209,6 +219,7 @@ class Job:
     def _end_current(self) -> None:
         result = without_nan(self._running.result())
         if isinstance(self._running, _native.FitJob):
+            self._check_source()
             result["error_by_angle"] = _rounded(result["error_by_angle"])
             self._fitted.append(result)
             self._measurement = self._running.measurement
@@ -224,13 +235,13 @@ class Job:
             return self._base_record().parameters
         if self._measurement is None:
             record = self._base_record()
-            path = record.source["path"]
-            if not is_unchanged(record.source):
+            self._measurement = read_unchanged(record.source)
+            if self._measurement is None:
+                path = record.source["path"]
                 found = "another file" if path and Path(path).is_file() else "no such file"
                 raise InputError(
                     f"{path or record.name}: expected the measurement of the record, found {found}."
                 )
-            self._measurement = read(path)
         return self._measurement
 
 
