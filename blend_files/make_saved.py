@@ -2,15 +2,16 @@
 
 Usage: python make_saved.py [NAME..], in a Python with bpy 4.2 and lobefit, so that every supported
 release opens the files. A file of an earlier version is made by the nodes of that time, from this
-repository's history; the last one by those that are installed. Each has a sphere under the two
-lights and a material of every kind of its time, of a sample made from published figures, and beside
-it NAME.npz has what Blender 4.2 renders of each. They are made once: a change of what is saved gets
-a file of its own, and the others stay as they are.
+repository's history; the others by those that are installed. Each has a sphere under the two
+lights and materials of a sample made from published figures, and beside it NAME.npz has what
+Blender 4.2 renders of each. They are made once: a change of what is saved gets a file of its own,
+and the others stay as they are.
 """
 
 import importlib
 import io
 import json
+import os
 import subprocess
 import sys
 import tarfile
@@ -20,6 +21,8 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+os.environ["HOME"] = os.sep  # the folder of a file browser, which is saved with the file
+
 import bpy
 import lobefit
 import lobefit_addon.scene
@@ -27,15 +30,17 @@ import numpy as np
 from lobefit import _native
 
 FOLDER = Path(__file__).with_name("saved")
-SIZE = 32  # pixels of the pictures
-ROUND = 4  # subdivisions of the sphere: 2,562 vertices
+SIZE = 24  # pixels of the pictures
+ROUND = 3  # subdivisions of the sphere: 642 vertices
 
 # The commit that has the nodes (None: they are installed), and the materials to make.
 VERSIONS: dict[str, tuple[str | None, tuple[str, ...]]] = {
     "live-1": ("7c1bbf70a7675ed3ece4cbf5a8af590afcda4b2f", ("live", "principled")),
+    "live-2": ("29dee27ba4691faf9e2b99f6216da41fc0558560", ("live", "principled")),
+    "live-3": (None, ("live", "principled")),
     "baked-1": ("f253ca022a0fc31b8e7043fdf8bc2bb624c4f408", ("measured", "lobe")),
-    "live-2": ("29dee27ba4691faf9e2b99f6216da41fc0558560", ("live", "measured", "lobe")),
-    "live-3": (None, ("live", "measured", "lobe", "principled", "bounces", "classic")),
+    "baked-2": (None, ("measured", "lobe", "bounces")),
+    "classic-1": (None, ("classic",)),
 }
 # What records did not hold at the time of the first version.
 LATER = ("closures", "error_by_angle", "uncertainty")
@@ -129,6 +134,7 @@ def write(place: Path, builders: list[Callable[[], bpy.types.Material]]) -> None
         sphere.data.materials[0] = material
         pictures[material.name] = lobefit_addon.scene.render_pixels(scene)
     sphere.data.materials[0] = materials[0]
+    bpy.data.batch_remove(bpy.data.brushes)
     bpy.data.orphans_purge()
     path = place.with_suffix(".blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), compress=True)

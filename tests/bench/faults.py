@@ -110,8 +110,8 @@ def judged(process: subprocess.Popen, out: Path, old: dict[str, bytes]) -> str:
         return DONE
     last = told[-1][:200] if told else "nothing"
     sentences = all(line.startswith("lobefit: ") and line.endswith(".") for line in told)
-    if process.returncode in (1, 2) and told and sentences:
-        return REFUSED if process.returncode == 1 or len(told) == 1 else f"said twice: {last}"
+    if process.returncode in (1, 2) and told and sentences and len(set(told)) == len(told):
+        return REFUSED
     return f"exit code {process.returncode}, saying {last}"
 
 
@@ -150,7 +150,8 @@ def damage_of(path: Path) -> str:
         case ".glb":
             whole = int.from_bytes(data[8:12], "little") == len(data)
         case ".usdc":
-            whole = data[:8] == b"PXR-USDC" and int.from_bytes(data[16:24], "little") < len(data)
+            table = int.from_bytes(data[16:24], "little")
+            whole = data[:8] == b"PXR-USDC" and 0 < table < len(data)
         case _:
             whole = data.endswith(b"\n")
     return "" if whole else "its end is missing"

@@ -15,8 +15,8 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "blend_files" / "saved"
 FILES = sorted(FOLDER.glob("*.blend"))
-NEWEST = FOLDER / "live-3.blend"
-SIZE, ROUND = 32, 4  # as in make_saved.py
+NEWEST = [FOLDER / f"{name}.blend" for name in ("live-3", "baked-2", "classic-1")]
+SIZE, ROUND = 24, 3  # as in make_saved.py
 # The suns are points and a pixel is one ray, so that nothing is left to chance: single precision
 # alone, in another order where a release or a processor computes in another.
 SAME = 1e-4
@@ -98,7 +98,7 @@ def test_an_object_of_a_saved_file_is_overridden(two_lights, file):
 def test_saved_records_are_read(file):
     materials = load(file, link=False)
     records = [json.loads(m["lobefit_record"]) for m in materials if "lobefit_record" in m]
-    assert records
+    assert records or file.stem == "classic-1"
     for record in records:
         read = json.loads(lobefit.Record.from_json(json.dumps(record)).to_json())
         assert {key: read[key] for key in record} == record
@@ -116,14 +116,14 @@ def test_nothing_that_is_saved_can_be_executed(file):
 @pytest.mark.skipif(
     bpy.app.version >= (5, 0), reason="the table of Conserve Energy is another one since Blender 5"
 )
-def test_the_newest_file_is_what_is_saved_now(addon):
+@pytest.mark.parametrize("file", NEWEST, ids=lambda file: file.stem)
+def test_the_newest_files_are_what_is_saved_now(addon, file):
     """Whoever changes what is saved adds a file, so that the one before stays tried."""
     tree_content = addon.swaps.tree_content
-    for material in from_open(NEWEST):
+    for material in from_open(file):
         if material.name == "classic":
             (node,) = addon.operators.classic.classic_nodes(material)
             saved = tree_content(node.node_tree)
-            node.node_tree.user_remap(None)
             bpy.data.node_groups.remove(node.node_tree)
             assert saved == tree_content(addon.nodes.classic.classic_group())
             continue

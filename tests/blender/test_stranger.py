@@ -1,13 +1,10 @@
 """A file or a record of a stranger is data: nothing in it is executed, and odd ones are refused."""
 
-import importlib
 import json
 
 import bpy
-import lobefit
 import pytest
-from conftest import EXTENSION
-from test_extension import draw_panel, drawn
+from test_extension import draw_panel
 
 DEEP = "[" * 100_000
 ODD = {

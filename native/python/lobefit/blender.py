@@ -5,7 +5,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -183,11 +183,28 @@ def export_principled(path: str | os.PathLike[str], name: str, record: Record) -
             export = bpy.ops.export_scene.gltf
         try:
             export(filepath=str(aside.absolute()))
+            whole = _is_whole(aside)
         except AttributeError as error:
             reason = "this Blender was built without an exporter for it"
             raise InputError(f"{path}: cannot be written, {reason}.") from error
         except RuntimeError as error:
             raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
+        if not whole:
+            raise InputError(f"{path}: cannot be written, its end is missing.")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a .glb or a .usdc is as long as it says; exporters do not tell of a full disk."""
+    data = path.read_bytes()
+
+    def number(place: int, size: int) -> int:
+        return int.from_bytes(data[place : place + size], "little")
+
+    if path.suffix == ".glb":
+        return len(data) == number(8, 4)
+    # It ends with a table of contents, which is as many entries as it says.
+    table = number(16, 8)
+    return 0 < table < len(data) and len(data) == table + 8 + 32 * number(table, 8)
 
 
 def leave_after_gltf(code: int) -> int:
@@ -336,14 +353,21 @@ def _save_as(aside: Path, path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keeps what Blender itself prints out of our results on stdout."""
+    """Keeps what Blender itself prints out of our results and messages."""
     sys.stdout.flush()
-    ours = os.dup(1)
+    sys.stderr.flush()
+    ours = os.dup(1), os.dup(2)
     try:
         # Operators tell their reports through Python, the rest of Blender by itself.
-        with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere):
+        with (
+            Path(os.devnull).open("w") as nowhere,
+            redirect_stdout(nowhere),
+            redirect_stderr(nowhere),
+        ):
             os.dup2(nowhere.fileno(), 1)
+            os.dup2(nowhere.fileno(), 2)
             yield
     finally:
-        os.dup2(ours, 1)
-        os.close(ours)
+        for number, kept in enumerate(ours, start=1):
+            os.dup2(kept, number)
+            os.close(kept)
