@@ -8,6 +8,7 @@ Blender 4.2 renders of each. They are made once: a change of what is saved gets 
 and the others stay as they are.
 """
 
+import dataclasses
 import importlib
 import io
 import json
@@ -31,7 +32,7 @@ from lobefit import _native
 
 FOLDER = Path(__file__).with_name("saved")
 SIZE = 24  # pixels of the pictures
-ROUND = 3  # subdivisions of the sphere: 642 vertices
+ROUND = 3  # subdivisions of the sphere: 162 vertices
 
 # The commit that has the nodes (None: they are installed), and the materials to make.
 VERSIONS: dict[str, tuple[str | None, tuple[str, ...]]] = {
@@ -91,6 +92,8 @@ def builder(
     options: dict[str, Any] = {"kind": kind, "name": kind}
     if kind == "bounces":
         options |= {"kind": "measured", "diffuse_bounces": True}
+    if kind in ("live", "principled"):
+        record = dataclasses.replace(record, closures=[])
     entries = json.loads(record.to_json())
     if version == "live-1":
         entries = {key: value for key, value in entries.items() if key not in LATER}
@@ -99,7 +102,7 @@ def builder(
         principled=record.principled,
         closures=record.closures,
         albedo=record.albedo,
-        to_json=lambda: json.dumps(entries),
+        to_json=lambda: json.dumps(entries, indent=1) + "\n",
     )
     return lambda: nodes.material.build_material(told, **options)
 
@@ -120,6 +123,19 @@ def classic_material() -> bpy.types.Material:
     return material
 
 
+def smooth_sphere() -> bpy.types.Mesh:
+    """A unit sphere without normals of its own, which releases save in different ways."""
+    import bmesh  # there once bpy is
+
+    mesh = bpy.data.meshes.new("Sphere")
+    shape = bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=ROUND, radius=1.0)
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.shade_smooth()
+    return mesh
+
+
 def write(place: Path, builders: list[Callable[[], bpy.types.Material]]) -> None:
     """Writes a file with all materials, the first one on the sphere, and the pictures of them."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -127,14 +143,16 @@ def write(place: Path, builders: list[Callable[[], bpy.types.Material]]) -> None
     materials = [build() for build in builders]
     scene = lobefit_addon.scene.two_lights_scene(None, SIZE)
     sphere = scene.objects["Sphere"]
-    sphere.data = lobefit_addon.scene.sphere_mesh(materials[0], ROUND)
+    bpy.data.batch_remove([sphere.data, *bpy.data.brushes])
+    sphere = bpy.data.objects.new("Sphere", smooth_sphere())
+    scene.collection.objects.link(sphere)
+    sphere.data.materials.append(materials[0])
     pictures = {}
     for material in materials:
         material.use_fake_user = True
         sphere.data.materials[0] = material
         pictures[material.name] = lobefit_addon.scene.render_pixels(scene)
     sphere.data.materials[0] = materials[0]
-    bpy.data.batch_remove(bpy.data.brushes)
     bpy.data.orphans_purge()
     path = place.with_suffix(".blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), compress=True)

@@ -146,9 +146,9 @@ void write_merl(const Measurement& measurement, const std::filesystem::path& pat
                      with_commas(bytes_of(dimensions)) + " bytes, found: " + why + ".");
   };
   const auto reason = [] { return std::string(std::strerror(errno)); };
+  std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());
   File file(std::fopen(aside.c_str(), "wb"));
   if (!file) give_up(reason());
-  std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());
   for (int channel = 0; channel < 3; ++channel) {
     double* const plane = stored.data() + channel * Measurement::bin_count;
     std::transform(plane, plane + Measurement::bin_count, plane, [=](double value) {

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lobefit import preview
+from lobefit import memory, preview
 from lobefit._native import InputError
 from lobefit.atomic import place_to_write, written_aside
 from lobefit.catalogues import Catalogues
@@ -37,17 +37,22 @@ def is_this_program() -> bool:
     return bpy is not None and bool(bpy.app.binary_path)
 
 
+_MEMORY = 1 << 30  # bytes; less is not enough for its exporters
 _POLL = 0.1  # seconds between two looks at work under way
 
 
 def need_blender() -> None:
-    """Raises InputError, with what to install, where Blender's Python module is missing."""
+    """Raises InputError, with what to install, where Blender's Python module is missing.
+
+    Raises MemoryError where there is too little for Blender, which would end the process.
+    """
     for module in _MODULES:
         if importlib.util.find_spec(module) is None:
             raise InputError(
                 f"expected the Python module {module} to make a material, found none; install it "
                 "with: pip install bpy."
             )
+    memory.need(_MEMORY)
 
 
 def write_blend(

@@ -80,6 +80,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _complain(f"{error.filename}: cannot be used, {reason(error)}.")
     except MemoryError:
         return _complain("expected enough memory, found too little.")
+    except ImportError as error:
+        return _complain(f"stopped, a part of Python cannot be loaded ({error}).")
 
 
 def _drop_output() -> None:

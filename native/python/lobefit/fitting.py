@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lobefit import _native
+from lobefit import _native, memory
 from lobefit._native import Cancelled, InputError, Measurement
 from lobefit.origin import Origin, origin_of, read_unchanged, stamp_of
 from lobefit.record import MODELS, Fit, Record, figure_of, without_nan
@@ -21,6 +21,7 @@ MOST_CLOSURES = 3
 # Up to which part of the light that is off the kind `auto` takes a material, if not told.
 TOLERANCE = 0.05
 
+_MEMORY = 1 << 28  # bytes that a job has room in
 _POLL = 0.05  # seconds between two looks at a job that is waited for
 _FIT_KEYS = tuple(Fit.__dataclass_fields__)
 _RECORD_KEYS = ("schedule", "norm", "channels", "max_angle")
@@ -89,7 +90,8 @@ class Job:
     "cosine-l1", "l2" or "log-l2". `max_angle` in degrees (up to 90) leaves out light and view
     directions beyond it. `channels` is "shared" (one exponent) or "separate". `uncertainty` True
     also finds how well the data determine the parameters, which takes up to three times as long as
-    the fit itself (metals). `threads` 0 takes every processor.
+    the fit itself (metals). `threads` 0 takes every processor. Raises MemoryError where there is
+    too little to begin.
     """
 
     def __init__(
@@ -99,6 +101,7 @@ class Job:
         closures: Sequence[Closures] = (),
         **options: Any,
     ) -> None:
+        memory.need(_MEMORY)
         self._options = options
         self._closures = list(closures)
         self._fitted: list[dict[str, Any]] = []
