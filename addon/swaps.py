@@ -20,6 +20,8 @@ def problem_of(material: bpy.types.Material) -> str:
         return "it is linked from another file"
     if not material.is_editable:
         return "it cannot be edited"
+    if material.node_tree is None:
+        return "it has no nodes"
     if material.node_tree.animation_data is not None:
         return "its nodes are animated"
     return ""

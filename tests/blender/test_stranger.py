@@ -52,6 +52,10 @@ def test_odd_records_are_refused(addon, record, fault):
         assert (shown, polls) == (["fit", "preview"], (True, True))
     else:
         assert (shown, polls) == (["import_measured", "make_classic"], (False, False))
-    restored = addon.simplification.restore_all()
-    (skipped,) = restored["skipped"]
-    assert skipped["reason"] == "its record does not hold what it showed"
+    reasons = ["its record does not hold what it showed"]
+    if material.node_tree is None:  # until Blender 4.5
+        reasons.insert(0, "it has no nodes")
+    for reason in reasons:
+        (skipped,) = addon.simplification.restore_all()["skipped"]
+        assert skipped["reason"] == reason
+        material.use_nodes = True
