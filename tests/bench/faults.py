@@ -109,7 +109,7 @@ def judged(process: subprocess.Popen, out: Path, old: dict[str, bytes]) -> str:
     if process.returncode == 0 and not told:
         return DONE
     last = told[-1][:200] if told else "nothing"
-    sentences = all(line.startswith("lobefit: ") and line.endswith(".") for line in told)
+    sentences = all(line.startswith("lobefit: ") and line.endswith((".", "?")) for line in told)
     if process.returncode in (1, 2) and told and sentences and len(set(told)) == len(told):
         return REFUSED
     return f"exit code {process.returncode}, saying {last}"
@@ -338,13 +338,16 @@ sys.exit(main(sys.argv[2:]))
 def changing_files(inputs: Inputs, folder: Path, _: int) -> Tries:
     """a file that vanishes, is cut, changes or is replaced while it is fitted"""
     tables = [path.read_bytes() for path in (inputs.table, inputs.tables / "1.binary")]
+    tables.append(tables[0][: len(tables[0]) // 2] + tables[1][len(tables[0]) // 2 :])
     path, place = folder / "table.binary", folder / "out" / "a.json"
     place.parent.mkdir()
     command = ["closures", path, "--closures", 1, "-o", place]
     truths = []
     for table in tables:
         path.write_bytes(table)
+        began = time.monotonic()
         run(command, place.parent)
+        seconds = time.monotonic() - began
         truths.append(contents(place.parent))
 
     def replace() -> None:
@@ -353,8 +356,8 @@ def changing_files(inputs: Inputs, folder: Path, _: int) -> Tries:
 
     def change() -> None:
         with path.open("r+b") as file:
-            file.seek(len(tables[0]) // 2)
-            file.write(tables[1][len(tables[0]) // 2 :])
+            file.seek(len(tables[2]) // 2)
+            file.write(tables[2][len(tables[2]) // 2 :])
 
     meddlers = {
         "vanishes": path.unlink,
@@ -368,7 +371,7 @@ def changing_files(inputs: Inputs, folder: Path, _: int) -> Tries:
             place.unlink(missing_ok=True)
             path.write_bytes(tables[0])
             process = start(command)
-            time.sleep(chance.uniform(0, 1.5))
+            time.sleep(chance.uniform(0, seconds))
             meddle()
             verdict = judged(process, place.parent, {})
             fine = verdict != DONE or contents(place.parent) in truths
