@@ -1,9 +1,12 @@
 """Materials and the records they carry, read also where the compiled module cannot be loaded."""
 
 import json
+from functools import lru_cache
 from typing import Any
 
 import bpy
+
+from . import native
 
 KEY = "lobefit_record"
 # What the material shows: its kind and the number of its specular closures.
@@ -26,9 +29,21 @@ def active_material(context: bpy.types.Context) -> bpy.types.Material | None:
 
 def record_of(material: bpy.types.Material | None) -> dict[str, Any] | None:
     """The entries of the record (RECORD.json) in a material, or None if it has none to be read."""
+    text = None if material is None else material.get(KEY)
+    return _entries(text) if isinstance(text, str) else None
+
+
+@lru_cache(maxsize=16)
+def _entries(text: str) -> dict[str, Any] | None:
+    # A file of a stranger may hold any text. Without the compiled module nothing is checked but
+    # that it is JSON.
     try:
-        return json.loads(material[KEY])
-    except (KeyError, TypeError, ValueError):
+        if not native.problem():
+            from lobefit import Record
+
+            Record.from_json(text)
+        return json.loads(text)
+    except (ValueError, RecursionError):
         return None
 
 

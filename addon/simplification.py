@@ -86,7 +86,7 @@ def _restored(material: bpy.types.Material) -> str:
 
     try:
         restore(material, lobefit.Record.from_json(material[KEY], material.name))
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, AttributeError):
         return "its record does not hold what it showed"
     return ""
 

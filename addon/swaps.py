@@ -17,10 +17,13 @@ _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 def problem_of(material: bpy.types.Material) -> str:
     """Why a material has to be left as it is; empty for one that may be changed."""
-    reason = lock_of(material)
-    if not reason and material.node_tree.animation_data is not None:
-        reason = "its nodes are animated"
-    return reason
+    if lock_of(material):
+        return lock_of(material)
+    if material.node_tree is None:
+        return "it has no nodes"
+    if material.node_tree.animation_data is not None:
+        return "its nodes are animated"
+    return ""
 
 
 def has_bounces(material: bpy.types.Material) -> bool:

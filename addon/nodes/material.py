@@ -164,7 +164,7 @@ def shown_by(material: bpy.types.Material, record: Any) -> Choice:
     """What a material made of the record shows; `live` in files from before there were kinds."""
     kind = material.get(KIND_KEY, "live")
     if kind not in BAKED:
-        return Choice(kind)
+        return Choice("principled" if kind == "principled" else "live")
     count = material.get(COUNT_KEY)
     entries = [entry for entry in record.closures if entry["target"] == kind]
     return Choice(kind, next((e for e in entries if len(e["specular"]) == count), None))

@@ -6,8 +6,10 @@
 #include <exception>
 #include <functional>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -15,12 +17,13 @@
 
 namespace lobefit {
 
-// The thread starts with the object and is joined by its destructor, which cancels it first.
+// The thread starts with the object and is joined by its destructor, which cancels it first. Where
+// the system gives no thread, for want of memory as a rule, std::bad_alloc is thrown.
 template <typename Result>
 class Job {
  public:
   explicit Job(std::function<Result(Monitor&)> work)
-      : work_(std::move(work)), thread_([this] { run(); }) {}
+      : work_(std::move(work)), thread_(started([this] { run(); })) {}
   ~Job() { monitor_.cancel(); }
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;
@@ -48,6 +51,14 @@ class Job {
   }
 
  private:
+  static std::jthread started(std::function<void()> work) {
+    try {
+      return std::jthread(std::move(work));
+    } catch (const std::system_error&) {
+      throw std::bad_alloc();
+    }
+  }
+
   void run() {
     try {
       result_ = work_(monitor_);

@@ -146,9 +146,9 @@ void write_merl(const Measurement& measurement, const std::filesystem::path& pat
                      with_commas(bytes_of(dimensions)) + " bytes, found: " + why + ".");
   };
   const auto reason = [] { return std::string(std::strerror(errno)); };
+  std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());
   File file(std::fopen(aside.c_str(), "wb"));
   if (!file) give_up(reason());
-  std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());
   for (int channel = 0; channel < 3; ++channel) {
     double* const plane = stored.data() + channel * Measurement::bin_count;
     std::transform(plane, plane + Measurement::bin_count, plane, [=](double value) {
@@ -157,10 +157,10 @@ void write_merl(const Measurement& measurement, const std::filesystem::path& pat
   }
   const bool written =
       std::fwrite(dimensions.data(), sizeof(dimensions), 1, file.get()) == 1 &&
-      std::fwrite(stored.data(), sizeof(double), stored.size(), file.get()) == stored.size() &&
-      std::fflush(file.get()) == 0;
-  if (!written) give_up(reason());
-  file.reset();
+      std::fwrite(stored.data(), sizeof(double), stored.size(), file.get()) == stored.size();
+  // What is written may be refused as late as by the end.
+  const bool closed = std::fclose(file.release()) == 0;
+  if (!written || !closed) give_up(reason());
   std::error_code error;
   std::filesystem::rename(aside, path, error);
   if (error) give_up(error.message());

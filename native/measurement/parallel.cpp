@@ -4,6 +4,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -28,7 +29,11 @@ void parallel_for(int count, int threads, const std::function<void(int)>& work) 
     }
   };
   std::vector<std::jthread> helpers;
-  for (int t = 1; t < std::min(threads, count); ++t) helpers.emplace_back(take_work);
+  try {
+    for (int t = 1; t < std::min(threads, count); ++t) helpers.emplace_back(take_work);
+  } catch (const std::system_error&) {
+    // Where the system gives no more threads, those that are there do the work.
+  }
   take_work();
   helpers.clear();
   if (failure) std::rethrow_exception(failure);

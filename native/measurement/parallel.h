@@ -9,7 +9,8 @@ namespace lobefit {
 int thread_count(int asked);
 
 // Calls work(0) .. work(count - 1), each once, on up to `threads` threads, the caller's among
-// them, and returns when all are done. An exception of any of them is thrown on.
+// them, or as many as the system gives, and returns when all are done. An exception of any of them
+// is thrown on.
 void parallel_for(int count, int threads, const std::function<void(int)>& work);
 
 }  // namespace lobefit

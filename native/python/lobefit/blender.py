@@ -5,14 +5,14 @@ import importlib.util
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobefit import preview
+from lobefit import memory, preview
 from lobefit._native import InputError
 from lobefit.atomic import place_to_write, written_aside
 from lobefit.catalogues import Catalogues
@@ -37,17 +37,22 @@ def is_this_program() -> bool:
     return bpy is not None and bool(bpy.app.binary_path)
 
 
+_MEMORY = 1 << 30  # bytes; less is not enough for its exporters
 _POLL = 0.1  # seconds between two looks at work under way
 
 
 def need_blender() -> None:
-    """Raises InputError, with what to install, where Blender's Python module is missing."""
+    """Raises InputError, with what to install, where Blender's Python module is missing.
+
+    Raises MemoryError where there is too little for Blender, which would end the process.
+    """
     for module in _MODULES:
         if importlib.util.find_spec(module) is None:
             raise InputError(
                 f"expected the Python module {module} to make a material, found none; install it "
                 "with: pip install bpy."
             )
+    memory.need(_MEMORY)
 
 
 def write_blend(
@@ -183,11 +188,28 @@ def export_principled(path: str | os.PathLike[str], name: str, record: Record) -
             export = bpy.ops.export_scene.gltf
         try:
             export(filepath=str(aside.absolute()))
+            whole = _is_whole(aside)
         except AttributeError as error:
             reason = "this Blender was built without an exporter for it"
             raise InputError(f"{path}: cannot be written, {reason}.") from error
         except RuntimeError as error:
             raise InputError(f"{path}: cannot be written, {_one_line(error)}.") from error
+        if not whole:
+            raise InputError(f"{path}: cannot be written, its end is missing.")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a .glb or a .usdc is as long as it says; exporters do not tell of a full disk."""
+    data = path.read_bytes()
+
+    def number(place: int, size: int) -> int:
+        return int.from_bytes(data[place : place + size], "little")
+
+    if path.suffix == ".glb":
+        return len(data) == number(8, 4)
+    # It ends with a table of contents, which is as many entries as it says.
+    table = number(16, 8)
+    return 0 < table < len(data) and len(data) == table + 8 + 32 * number(table, 8)
 
 
 def leave_after_gltf(code: int) -> int:
@@ -259,7 +281,10 @@ def _open(path: str | os.PathLike[str]) -> None:
 
     with quiet():
         try:
-            bpy.ops.wm.open_mainfile(filepath=str(Path(path).absolute()), load_ui=False)
+            # A file may be a stranger's: its scripts and drivers stay what they are, data.
+            bpy.ops.wm.open_mainfile(
+                filepath=str(Path(path).absolute()), load_ui=False, use_scripts=False
+            )
         except RuntimeError as error:
             raise InputError(
                 f"{path}: expected a Blender file, found one that cannot be opened "
@@ -333,14 +358,21 @@ def _save_as(aside: Path, path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keeps what Blender itself prints out of our results on stdout."""
+    """Keeps what Blender itself prints out of our results and messages."""
     sys.stdout.flush()
-    ours = os.dup(1)
+    sys.stderr.flush()
+    ours = os.dup(1), os.dup(2)
     try:
         # Operators tell their reports through Python, the rest of Blender by itself.
-        with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere):
+        with (
+            Path(os.devnull).open("w") as nowhere,
+            redirect_stdout(nowhere),
+            redirect_stderr(nowhere),
+        ):
             os.dup2(nowhere.fileno(), 1)
+            os.dup2(nowhere.fileno(), 2)
             yield
     finally:
-        os.dup2(ours, 1)
-        os.close(ours)
+        for number, kept in enumerate(ours, start=1):
+            os.dup2(kept, number)
+            os.close(kept)

@@ -5,7 +5,7 @@ import uuid
 from pathlib import Path
 
 from lobefit._native import InputError
-from lobefit.atomic import reason, write_bytes
+from lobefit.atomic import alone_in, reason, write_bytes
 
 FILE = "blender_assets.cats.txt"
 
@@ -26,10 +26,9 @@ class Catalogues:
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.path = Path(folder) / FILE
-        self._text = _read(self.path) if self.path.is_file() else _HEAD
         self._fresh: list[str] = []
         self._ids: dict[str, str] = {}
-        for line in self._text.splitlines():
+        for line in _read(self.path).splitlines():
             identifier, _, rest = line.partition(":")
             if rest and not line.startswith("#"):
                 self._ids.setdefault(rest.partition(":")[0], identifier)
@@ -48,15 +47,26 @@ class Catalogues:
         return self._ids[path]
 
     def save(self) -> None:
-        """Writes the file, all of it or nothing, if a catalogue was added."""
-        if self._fresh:
-            gap = "" if self._text.endswith("\n") else "\n"
-            write_bytes(self.path, (self._text + gap + "".join(self._fresh)).encode())
+        """Writes the file, all of it or nothing, if a catalogue was added.
+
+        What other processes have added meanwhile is kept too.
+        """
+        if not self._fresh:
+            return
+        with alone_in(self.path.parent):
+            text = _read(self.path)
+            missing = [line for line in self._fresh if line.partition(":")[0] not in text]
+            if missing:
+                gap = "" if text.endswith("\n") else "\n"
+                write_bytes(self.path, (text + gap + "".join(missing)).encode())
 
 
 def _read(path: Path) -> str:
+    """What the file says; what a new one says where there is none."""
     try:
         text = path.read_bytes().decode()
+    except FileNotFoundError:
+        return _HEAD
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected text in UTF-8, found other bytes.") from error
     except OSError as error:

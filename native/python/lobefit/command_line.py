@@ -30,7 +30,7 @@ from lobefit import (
     simplified,
 )
 from lobefit._native import Cancelled, InputError
-from lobefit.atomic import make_folder, place_to_write, write_bytes
+from lobefit.atomic import make_folder, place_to_write, reason, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
 from lobefit.classic import LEAST_EXPONENT, match_exponent
 from lobefit.classic import MOST_EXPONENT as MOST_EXPONENT_TO_MATCH
@@ -63,6 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         code: int = options.run(options)
+        sys.stdout.flush()
         return code
     except InputError as error:
         return _complain(error)
@@ -70,11 +71,22 @@ def main(arguments: list[str] | None = None) -> int:
         print("lobefit: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our results has gone; what Python still flushes at its end goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return DONE
+    except OSError as error:
+        if error.filename is None:  # the output's, or a process's that could not be started
+            _drop_output()
+            return _complain(f"stopped, {reason(error)}.")
+        return _complain(f"{error.filename}: cannot be used, {reason(error)}.")
     except MemoryError:
         return _complain("expected enough memory, found too little.")
+    except ImportError as error:
+        return _complain(f"stopped, a part of Python cannot be loaded ({error}).")
+
+
+def _drop_output() -> None:
+    """Whoever takes our results is gone; what Python still flushes at its end goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(problem: object) -> int:
@@ -503,15 +515,15 @@ def _info(options: argparse.Namespace) -> int:
             _tell_of_record(Record.load(path), path, options.json)
             return
         measurement = read(path)
-        bins, origin = dict(measurement.bins), origin_of(path)
+        bins, origin, size = dict(measurement.bins), origin_of(path), path.stat().st_size
         warnings = measurement.warnings + _bin_warnings(bins)
         if options.json:
-            facts = origin.entries() | {"format": measurement.format, "bytes": path.stat().st_size}
+            facts = origin.entries() | {"format": measurement.format, "bytes": size}
             print(json.dumps(facts | {"bins": bins, "warnings": warnings}))
             return
         named = f", {origin.name}" if origin.name else ""
-        size = f"{path.stat().st_size:,} bytes"
-        print(f"{path}: {measurement.format}{named}, {size}, {bins['valid']:,} valid bins")
+        print(f"{path}: {measurement.format}{named}, {size:,} bytes, ", end="")
+        print(f"{bins['valid']:,} valid bins")
         print(f"  rejected: {bins['below_horizon']:,} below the horizon, ", end="")
         print(f"{bins['negative']:,} negative, {bins['non_finite']:,} not finite")
         for warning in warnings:

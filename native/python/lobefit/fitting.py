@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lobefit import _native
+from lobefit import _native, memory
 from lobefit._native import Cancelled, InputError, Measurement
-from lobefit.origin import Origin, OriginSearch, is_unchanged
+from lobefit.origin import Origin, OriginSearch, read_unchanged, stamp_of
 from lobefit.record import MODELS, Fit, Record, figure_of, without_nan
 
 Source = str | os.PathLike[str] | Measurement
@@ -21,6 +21,7 @@ MOST_CLOSURES = 3
 # Up to which part of the light that is off the kind `auto` takes a material, if not told.
 TOLERANCE = 0.05
 
+_MEMORY = 1 << 28  # bytes that a job has room in
 _POLL = 0.05  # seconds between two looks at a job that is waited for
 _SLICE = 0.01  # seconds to spend on the origin where there is no time to wait
 _FIT_KEYS = tuple(Fit.__dataclass_fields__)
@@ -90,7 +91,8 @@ class Job:
     "cosine-l1", "l2" or "log-l2". `max_angle` in degrees (up to 90) leaves out light and view
     directions beyond it. `channels` is "shared" (one exponent) or "separate". `uncertainty` True
     also finds how well the data determine the parameters, which takes up to three times as long as
-    the fit itself (metals). `threads` 0 takes every processor.
+    the fit itself (metals). `threads` 0 takes every processor. Raises MemoryError where there is
+    too little to begin.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class Job:
         closures: Sequence[Closures] = (),
         **options: Any,
     ) -> None:
+        memory.need(_MEMORY)
         self._options = options
         self._closures = list(closures)
         self._fitted: list[dict[str, Any]] = []
@@ -115,6 +118,8 @@ class Job:
             self._models = list(MODELS) if model == "all" else [model]
         from_file = isinstance(self._source, str) and bool(self._models)
         self._origin = OriginSearch(self._source) if from_file else None
+        self._stamp = stamp_of(self._source) if from_file else None
+        self._failure: InputError | None = None
         self._cancelled = False
         self._running: _native.FitJob | _native.ClosureJob | None = None
         self._begin_next()
@@ -156,7 +161,11 @@ class Job:
             if self._cancelled:
                 return True
             self._take(without_nan(result))
-            self._begin_next()
+            try:
+                self._begin_next()
+            except InputError as error:
+                self._failure = error
+                return True
         return known and self._running is None
 
     def record(self) -> Record:
@@ -168,6 +177,8 @@ class Job:
             pass
         if self._cancelled:
             raise Cancelled("the fit was cancelled")
+        if self._failure is not None:
+            raise self._failure
         if self._running is not None:
             self._running.result()  # raises what ended it
         record = self._base_record()
@@ -179,6 +190,7 @@ class Job:
     def _base_record(self) -> Record:
         if self._record is None:
             origin = self._origin.advance(math.inf) if self._origin else None
+            self._check_source()
             self._record = _record(self._fitted, origin or Origin())
         return self._record
 
@@ -188,6 +200,14 @@ class Job:
             return self._origin is None or self._origin.advance(seconds) is not None
         except InputError:  # the reader's to tell of, in the threads, or else that of `record`
             return True
+
+    def _check_source(self) -> None:
+        """Raises InputError where what was read and what the record will name may differ."""
+        if self._origin and stamp_of(self._source) != self._stamp:
+            raise InputError(
+                f"{self._source}: expected a file that stays as it is while it is fitted, found "
+                "that it changed."
+            )
 
     def _begin_next(self) -> None:
         self._running = None
@@ -223,13 +243,13 @@ class Job:
             return self._base_record().parameters
         if self._measurement is None:
             record = self._base_record()
-            path = record.source["path"]
-            if not is_unchanged(record.source):
+            self._measurement = read_unchanged(record.source)
+            if self._measurement is None:
+                path = record.source["path"]
                 found = "another file" if path and Path(path).is_file() else "no such file"
                 raise InputError(
                     f"{path or record.name}: expected the measurement of the record, found {found}."
                 )
-            self._measurement = read(path)
         return self._measurement
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from lobefit import _native
-from lobefit._native import InputError
-from lobefit.atomic import make_folder, reason, write_bytes
+from lobefit._native import InputError, Measurement
+from lobefit.atomic import alone_in, make_folder, reason, write_bytes, written_aside
 
 _AT_ONCE = 1 << 20  # bytes to hash before looking at the time
 _LIST = "samples.csv"
@@ -77,6 +77,28 @@ class OriginSearch:
         self.origin = Origin(str(place), digest, _listed(place.parent).get(digest, {}).get("name"))
 
 
+def stamp_of(path: str | os.PathLike[str]) -> tuple[int, ...] | None:
+    """What changes when a file is written to or replaced by another; None where there is none."""
+    try:
+        told = os.stat(path)
+    except OSError:
+        return None
+    return told.st_dev, told.st_ino, told.st_size, told.st_mtime_ns
+
+
+def read_unchanged(source: Mapping[str, Any]) -> Measurement | None:
+    """The measurement of a record's `source`; None where its file is gone or another one."""
+    path = source["path"]
+    if not path or not Path(path).is_file():
+        return None
+    try:
+        measurement = Measurement.read(path)
+    except InputError:
+        return None
+    # Asked afterwards, so that a file that changes while it is read is another one.
+    return measurement if is_unchanged(source) else None
+
+
 def is_unchanged(source: Mapping[str, Any]) -> bool:
     """Whether the file of a record's `source` is there, and is still the one that was fitted."""
     path, digest = source["path"], source["sha256"]
@@ -91,7 +113,8 @@ def write_samples(folder: str | os.PathLike[str], names: list[str]) -> list[Path
     paths = []
     for name in names:
         paths.append(place / f"{name}.binary")
-        _native.sample(name).write(str(paths[-1]))
+        with written_aside(paths[-1]) as aside:
+            _native.sample(name).write(str(aside))
     _write_list(place, paths)
     return paths
 
@@ -103,16 +126,17 @@ def sample_title(name: str) -> str:
 
 def _write_list(folder: Path, paths: list[Path]) -> None:
     """Adds the samples to the folder's list; those written earlier stay in it."""
-    rows = _listed(folder)
-    for path in paths:
-        digest = origin_of(path).sha256 or ""
-        values = (digest, path.name, sample_title(path.stem), _PAPER)
-        rows[digest] = dict(zip(_COLUMNS, values, strict=True))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n", extrasaction="ignore")
-    writer.writeheader()
-    writer.writerows(rows.values())
-    write_bytes(folder / _LIST, text.getvalue().encode())
+    with alone_in(folder):
+        rows = _listed(folder)
+        for path in paths:
+            digest = origin_of(path).sha256 or ""
+            values = (digest, path.name, sample_title(path.stem), _PAPER)
+            rows[digest] = dict(zip(_COLUMNS, values, strict=True))
+        text = io.StringIO()
+        writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n", extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows.values())
+        write_bytes(folder / _LIST, text.getvalue().encode())
 
 
 def _listed(folder: Path) -> dict[str, dict[str, str]]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lobefit import _native, lettering, picture
 from lobefit._native import Measurement
 from lobefit.classic import as_classic
-from lobefit.origin import is_unchanged
+from lobefit.origin import read_unchanged
 from lobefit.picture import Image
 from lobefit.record import Record
 
@@ -58,7 +58,7 @@ class Row:
 
 def measurement_of(record: Record) -> Measurement | None:
     """The measurement a record was fitted to, or None where its file is gone or another one."""
-    return Measurement.read(record.source["path"]) if is_unchanged(record.source) else None
+    return read_unchanged(record.source)
 
 
 def row(

@@ -1,0 +1,61 @@
+"""A file or a record of a stranger is data: nothing in it is executed, and odd ones are refused."""
+
+import json
+
+import bpy
+import lobefit
+import pytest
+from test_extension import draw_panel
+
+DEEP = "[" * 100_000
+ODD = {
+    "number": 5,
+    "empty": "",
+    "no JSON": "import os",
+    "list": "[1]",
+    "empty object": "{}",
+    "text of a number": "5",
+    "deep": DEEP,
+    "deep inside": '{"schema": 1, "models": ' + DEEP,
+    "huge number": '{"schema": 1' + "0" * 5000 + "}",
+    "huge text": '{"schema": "' + "x" * 10_000_000 + '"}',
+    "NUL": '{"schema": "\\u0000"}',
+}
+CHANGES = {
+    "odd keys": {"__class__": "os", "to_json": 1, "schema ": 2, "": None},
+    "schema": {"schema": "1"},
+    "source": {"source": None},
+    "path": {"source": {"path": ["/etc/passwd"]}},
+    "parameters": {"parameters": {"__import__": "os"}},
+    "closures": {"closures": [{"target": "measured", "count": 2}]},
+    "endless": {"max_angle": 1e999},
+}
+
+
+@pytest.fixture(scope="module")
+def record(measured_file) -> dict:
+    """The entries of a record without a fault."""
+    return json.loads(lobefit.fit(measured_file).to_json())
+
+
+@pytest.mark.parametrize("fault", [*ODD, *CHANGES])
+def test_odd_records_are_refused(addon, record, fault):
+    material = bpy.data.materials.new("odd")
+    odd = ODD[fault] if fault in ODD else json.dumps(record | CHANGES[fault])
+    material["lobefit_record"] = odd
+    material["lobefit_kind"], material["lobefit_before"] = fault, "rm"
+    shown = draw_panel(material=material).operators
+    with bpy.context.temp_override(material=material):
+        polls = bpy.ops.lobefit.preview.poll(), bpy.ops.lobefit.fit.poll()
+    if fault == "odd keys":
+        # What a later version may add is no fault, and is not looked at.
+        assert (shown, polls) == (["fit", "preview"], (True, True))
+    else:
+        assert (shown, polls) == (["import_measured", "make_classic"], (False, False))
+    reasons = ["its record does not hold what it showed"]
+    if material.node_tree is None:  # until Blender 4.5
+        reasons.insert(0, "it has no nodes")
+    for reason in reasons:
+        (skipped,) = addon.simplification.restore_all()["skipped"]
+        assert skipped["reason"] == reason
+        material.use_nodes = True
