@@ -162,9 +162,7 @@ node, and heights for displacement. The file of lights says which images belong 
         source = self._source()
         self._first = names[0]
         pictures = normals.together(names, list(map(linear_light, _images(names))))
-        return normals.Job(
-            pictures.values, lighting, source, pictures.mask, pictures.saturation
-        )
+        return normals.Job(pictures.values, lighting, source, pictures.mask, pictures.saturation)
 
     def _source(self) -> Any:
         """What the images show, as `lobefit.normals` takes it."""

@@ -20,7 +20,9 @@ struct Grid {
   bool within(int row, int column) const {
     return row >= 0 && row < rows && column >= 0 && column < columns;
   }
-  bool shows(int row, int column) const { return within(row, column) && mask[at(row, column)] != 0; }
+  bool shows(int row, int column) const {
+    return within(row, column) && mask[at(row, column)] != 0;
+  }
 
   // The grid of pixels twice as wide; one of them shows the surface if any of its four does.
   Grid halved() const {

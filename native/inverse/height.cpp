@@ -11,7 +11,8 @@ namespace {
 
 // Below so many pixels a guess for the whole is not needed.
 constexpr std::size_t few = 64 * 64;
-// Steeper slopes, beyond 84 degrees, are taken for this one: of a height in pixels they tell no more.
+// Steeper slopes, beyond 84 degrees, are taken for this one: of a height in pixels they tell no
+// more.
 constexpr double least_cosine = 0.1;
 
 std::vector<Vector3> halved_normals(const Grid& grid, const Grid& half,
@@ -42,8 +43,8 @@ std::vector<double> heights_of(const Grid& grid, const std::vector<Vector3>& nor
     guess = spread(grid, half, heights_of(half, halved_normals(grid, half, normals)));
     for (double& height : guess) height *= 2;
   }
-  Membrane membrane{{}, {}, std::vector<double>(grid.size(), 0.0),
-                    std::vector<double>(grid.size(), 0.0)};
+  Membrane membrane{
+      {}, {}, std::vector<double>(grid.size(), 0.0), std::vector<double>(grid.size(), 0.0)};
   membrane.right.resize(grid.size());
   membrane.down.resize(grid.size());
   for (int row = 0; row < grid.rows; ++row) {
@@ -78,7 +79,8 @@ void settle(const Grid& grid, std::vector<double>& heights) {
       double lowest = std::numeric_limits<double>::max();
       for (std::size_t next = 0; next < part.size(); ++next) {
         const auto width = static_cast<std::size_t>(grid.columns);
-        const int r = static_cast<int>(part[next] / width), c = static_cast<int>(part[next] % width);
+        const int r = static_cast<int>(part[next] / width),
+                  c = static_cast<int>(part[next] % width);
         lowest = std::min(lowest, heights[part[next]]);
         visit(r, c + 1), visit(r, c - 1), visit(r + 1, c), visit(r - 1, c);
       }
@@ -96,8 +98,8 @@ std::vector<double> inflated_squares(const Grid& grid) {
     for (double& height : guess) height *= 4;
   }
   // Where no silhouette holds a part down, the picture cuts all of it, the anchor leaves it flat.
-  Membrane membrane{{}, {}, std::vector<double>(grid.size(), 1e-8),
-                    std::vector<double>(grid.size(), 4.0)};
+  Membrane membrane{
+      {}, {}, std::vector<double>(grid.size(), 1e-8), std::vector<double>(grid.size(), 4.0)};
   membrane.right.assign(grid.size(), {1, 0});
   membrane.down.assign(grid.size(), {1, 0});
   for (int row = 0; row < grid.rows; ++row) {

@@ -23,8 +23,8 @@ std::vector<int> numbered(const Grid& grid) {
 std::vector<double> rest(const Grid& grid, const Membrane& membrane,
                          const std::vector<double>& guess) {
   const std::vector<int> numbers = numbered(grid);
-  const int count = static_cast<int>(std::count_if(numbers.begin(), numbers.end(),
-                                                   [](int number) { return number >= 0; }));
+  const int count = static_cast<int>(
+      std::count_if(numbers.begin(), numbers.end(), [](int number) { return number >= 0; }));
   std::vector<double> heights(grid.size(), 0.0);
   if (count == 0) return heights;
 

@@ -13,8 +13,9 @@ using Observed = Eigen::Map<const Eigen::VectorXf>;
 
 // The penalty of one channel for r = observed - predicted, both compressed: L1, so that few
 // channels which the model does not explain, such as highlights that it shapes badly, do not bend
-// the others. What is darker than it should be may lie in another part's shadow: its penalty does
-// not grow above `darkness`, and with few pictures it takes no part in the choice.
+// the others. What is darker than it should be may lie in another part's shadow: its penalty stays
+// below `darkness`. With a limit of 1 normals that turn away from two of six lights, for the sake
+// of shadows cast there, win over the true ones.
 struct Penalty {
   // |r| is rounded off below a per cent of brightness, so that derivatives exist.
   static constexpr float rounding = 0.01f;

@@ -35,13 +35,13 @@ class Lattice {
     thread_local std::vector<float> penalties;
     penalties.resize(places_.size());
     for (std::size_t i = 0; i < places_.size(); ++i) {
-      penalties[i] = penalty(values_.data() + i * static_cast<std::size_t>(channels_), observed,
-                             saturated);
+      penalties[i] =
+          penalty(values_.data() + i * static_cast<std::size_t>(channels_), observed, saturated);
     }
     std::vector<std::size_t> best;
     for (std::size_t i = 0; i < places_.size(); ++i) {
-      const bool beaten = std::any_of(
-          neighbours_[i].begin(), neighbours_[i].end(), [&](int neighbour) {
+      const bool beaten =
+          std::any_of(neighbours_[i].begin(), neighbours_[i].end(), [&](int neighbour) {
             return neighbour >= 0 && penalties[static_cast<std::size_t>(neighbour)] < penalties[i];
           });
       if (!beaten) best.push_back(i);

@@ -6,9 +6,8 @@ namespace lobefit {
 
 Shading::Shading(const Reflectance& f_times_cosine, const std::vector<Lighting>& lighting)
     : f_times_cosine_(f_times_cosine) {
-  const bool ambient = std::any_of(lighting.begin(), lighting.end(), [](const Lighting& each) {
-    return (each.ambient > 0).any();
-  });
+  const bool ambient = std::any_of(lighting.begin(), lighting.end(),
+                                   [](const Lighting& each) { return (each.ambient > 0).any(); });
   if (ambient) albedo_.emplace(f_times_cosine);
 }
 

@@ -12,7 +12,8 @@ namespace lobefit {
 // The forward direction: lights and ambient light on one point, without shadows that others cast.
 class Shading {
  public:
-  // f cos(theta_i), called from several threads. The ambient light of these lightings alone is known.
+  // f cos(theta_i), called from several threads. The ambient light of these lightings alone is
+  // known.
   Shading(const Reflectance& f_times_cosine, const std::vector<Lighting>& lighting);
 
   // The value of a pixel, exposure included.

@@ -1,7 +1,7 @@
 // Normals in the stereographic plane, in which Ikeuchi and Horn, "Numerical shape from shading and
-// occluding boundaries", Artificial Intelligence 17, 1981, write them: slopes grow beyond all bounds
-// toward the silhouette, where this plane has the unit circle, and its angles are those between
-// normals.
+// occluding boundaries", Artificial Intelligence 17, 1981, write them: slopes grow beyond all
+// bounds toward the silhouette, where this plane has the unit circle, and its angles are those
+// between normals.
 #pragma once
 
 #include <Eigen/Core>

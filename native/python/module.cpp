@@ -490,7 +490,8 @@ Pictures pictures_from(const FloatArray& values, const MaskArray& mask,
   if (values.shape(0) != static_cast<py::ssize_t>(lighting.size()) || lighting.empty()) {
     throw InputError("pictures: expected one or more, each with its lighting.");
   }
-  Pictures pictures{{static_cast<int>(mask.shape(0)), static_cast<int>(mask.shape(1)),
+  Pictures pictures{{static_cast<int>(mask.shape(0)),
+                     static_cast<int>(mask.shape(1)),
                      {mask.data(), mask.data() + mask.size()}},
                     std::move(lighting),
                     {},
@@ -509,10 +510,8 @@ std::unique_ptr<NormalsJob> start_normals_job(const FloatArray& values, const Ma
   if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
   return std::make_unique<NormalsJob>(
       [pictures = pictures_from(values, mask, lighting_from(lighting), saturation),
-       reflectance = previewed(source),
-       options = NormalsOptions{floor, threads}](Monitor& monitor) {
-        return estimate_normals(pictures, reflectance, options, monitor);
-      });
+       reflectance = previewed(source), options = NormalsOptions{floor, threads}](
+          Monitor& monitor) { return estimate_normals(pictures, reflectance, options, monitor); });
 }
 
 // Normals (rows, columns, 3) and heights (rows, columns).

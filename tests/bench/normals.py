@@ -5,7 +5,7 @@ are rendered under six suns and given to the estimate with the material's own fo
 of the angles between true and estimated normals, in degrees, are those of
 
     sphere, bumpy   floating-point renders; the bumpy surface casts shadows
-    noise           bumpy, with Gaussian noise of 1 % of the brightest light
+    noise           bumpy, with Gaussian noise of .25 % of the brightest light
     8 bits          bumpy, as an 8-bit sRGB picture whose highlights, 2 % of what is lit, are cut
     one light       sphere under one of the suns alone, from the silhouette inward
 
@@ -21,6 +21,7 @@ import bpy
 import lobefit
 import numpy as np
 from lobefit import heat_map, lettering, picture
+from lobefit.blender import quiet
 from lobefit.lights import Light, Lighting
 from lobefit.normals import as_normal_map, normals, reflectance_of, shade
 from lobefit_addon import build_material
@@ -99,7 +100,7 @@ def bumpy_mesh() -> bpy.types.Mesh:
 
 def rendered(material: bpy.types.Material, shape: str, size: int, lights: list[Lighting]):
     """The pictures (K, size, size, 3) that Cycles gives of a shape under each lighting."""
-    bpy.context.window.scene = scene = bpy.data.scenes.new("Normals")
+    bpy.context.window.scene = bpy.data.scenes.new("Normals")
     scene = two_lights_scene(material, size)
     item = next(item for item in scene.objects if item.type == "MESH")
     if shape == "bumpy":
@@ -117,7 +118,8 @@ def rendered(material: bpy.types.Material, shape: str, size: int, lights: list[L
     for each in lights:
         toward = Vector(each.lights[0].direction)
         sun.rotation_euler = toward.to_track_quat("Z", "Y").to_euler()
-        pictures.append(np.array(radiance(scene)))
+        with quiet():
+            pictures.append(np.array(radiance(scene)))
     bpy.data.scenes.remove(scene)
     return np.stack(pictures)
 
@@ -151,7 +153,7 @@ def study(record: lobefit.Record, kind: str, size: int) -> list[float]:
     true = {"sphere": sphere(size), "bumpy": bumpy(size)}
     row.append(error(pictures["sphere"], lights, source, true["sphere"])[0])
     row.append(error(pictures["bumpy"], lights, source, true["bumpy"])[0])
-    sigma = 0.01 * float(np.percentile(pictures["bumpy"], 99))
+    sigma = 0.0025 * float(np.percentile(pictures["bumpy"], 99))
     noisy = pictures["bumpy"] + np.random.default_rng(1).normal(0, sigma, pictures["bumpy"].shape)
     row.append(error(noisy, lights, source, true["bumpy"])[0])
     cut, saturation = eight_bits(pictures["bumpy"])
@@ -180,8 +182,10 @@ def speed(size: int) -> None:
             began = time.perf_counter()
             median, _ = error(pictures, lights, source, true, threads=threads)
             seconds = (time.perf_counter() - began) / (true.any(-1).sum() / 1e6)
-            print(f"{shape}, {len(lights)} pictures, {threads} threads: {seconds:.1f} s a megapixel, "
-                  f"median {median:.3f} degrees")  # fmt: skip
+            print(
+                f"{shape}, {len(lights)} pictures, {threads} threads: {seconds:.1f} s a megapixel, "
+                f"median {median:.3f} degrees"
+            )
 
 
 SIZE, GAP, LEFT, TOP = 200, 10, 150, 46
@@ -206,7 +210,9 @@ def row_of_pictures(record: lobefit.Record, shape: str) -> tuple[list[np.ndarray
     for at, angle in zip(np.argwhere(mask), angles(found, true)[mask], strict=True):
         text = heat_map.color_of(angle / 10).removeprefix("#")
         colors[tuple(at)] = [int(text[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    maps = [np.where(mask[..., None], as_normal_map(n.astype(np.float32)), 0) for n in (true, found)]
+    maps = [
+        np.where(mask[..., None], as_normal_map(n.astype(np.float32)), 0) for n in (true, found)
+    ]
     return [shown[0], *maps, colors, *shown[1:]], median
 
 
@@ -221,7 +227,9 @@ def draw(records: list[lobefit.Record], path: str) -> None:
         images, median = row_of_pictures(record, shape)
         top = TOP + index * step
         for line, text in enumerate((record.name, shape, f"{median:.2f} deg")):
-            lettering.draw(sheet, text, LEFT - GAP, top + SIZE / 2 + 24 * line - 24, 15.0, INK, "right")
+            lettering.draw(
+                sheet, text, LEFT - GAP, top + SIZE / 2 + 24 * line - 24, 15.0, INK, "right"
+            )
         for column, image in enumerate(images):
             cover = picture.disc(SIZE) if shape == "sphere" else 1.0
             picture.paste(sheet, image, top, LEFT + column * step, cover)

@@ -233,8 +233,8 @@ TEST(Inverse, OneLightAndTheSilhouetteTellTheNormals) {
     const Scene scene = scene_of(shape, {from({0.5, 0.4, 1})}, 96);
     const double blown_up = median_error(scene, inflated_normals(scene.pictures.grid));
     const double found = median_error(scene, estimate(scene.pictures).normals);
-    // The sphere is what the mask blown up is; of the lentil, from which that is 20 degrees off, the
-    // shading has to tell, and smoothness leaves some of the way.
+    // The sphere is what the mask blown up is; of the lentil, from which that is 20 degrees off,
+    // the shading has to tell, and smoothness leaves some of the way.
     EXPECT_LT(found, std::max(3.0, blown_up / 3));
   }
 }

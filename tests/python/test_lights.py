@@ -102,23 +102,18 @@ def changed(path, value):
 
 @pytest.mark.parametrize("path", PLACES, ids=lambda path: ".".join(map(str, path)))
 def test_damage_anywhere_is_refused_in_one_sentence(path):
-    optional = path[-1] in ("ambient", "exposure") or path == ("pictures", 0, "lights")[:0]
-    numbers = not isinstance(path[-1], str) or path[-1] in ("ambient", "exposure")
-    if not optional:
-        without = changed(path, ...)
-        # One of two pictures or lights less is a file of another scene, not a damaged one.
-        if not (isinstance(path[-1], int) and path[-2] in ("pictures", "lights")):
-            refusal(without)
-        elif path == ("pictures", 0, "lights", 0):
-            refusal(without)
+    key = path[-1]
+    # One of two pictures or lights less is a file of another scene, not a damaged one.
+    only_light = path == ("pictures", 0, "lights", 0)
+    if key not in ("ambient", "exposure") and (key not in (0, 1) or only_light):
+        refusal(changed(path, ...))
     for wrong in (None, True, {}, [], "", [[]], -1e300, 10**400, [1, 2], [1, 2, 3, 4]):
-        if wrong == [] or wrong == {} or path[-1] != "image" or not isinstance(wrong, str):
-            refusal(changed(path, wrong))
-    if numbers:
+        refusal(changed(path, wrong))
+    if isinstance(key, int) or key in ("ambient", "exposure"):
         for absurd in (1e7, -1e7):
             refusal(changed(path, absurd))
-        if path[-1] in ("ambient", "exposure") or "irradiance" in path:
-            refusal(changed(path, -0.001))
+    if key in ("ambient", "exposure", "irradiance") or "irradiance" in path:
+        refusal(changed(path, -0.001))
 
 
 @pytest.mark.parametrize("constant", ["NaN", "Infinity", "-Infinity"])

@@ -7,6 +7,9 @@ TIFF and JPEG among them, and is the library that Blender itself reads them with
 
 import importlib.util
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,11 +61,12 @@ def read_image(path: str | os.PathLike[str], linear: bool = False) -> Image:
         raise InputError(f"{path}: expected a picture, found {what}.")
     as_stored = OpenImageIO.ImageSpec()
     as_stored.attribute("oiio:UnassociatedAlpha", 1)
-    file = OpenImageIO.ImageInput.open(str(path), as_stored)
+    with _own_words():
+        file = OpenImageIO.ImageInput.open(str(path), as_stored)
     if file is None:
         OpenImageIO.geterror()  # is in no form for users
         raise InputError(f"{path}: expected a picture, found another kind of file.")
-    try:
+    with closing(file), _own_words():
         spec = file.spec()
         if not 1 <= spec.width * spec.height <= MOST_PIXELS:
             raise InputError(
@@ -72,9 +76,8 @@ def read_image(path: str | os.PathLike[str], linear: bool = False) -> Image:
         values = file.read_image(0, 0, 0, spec.nchannels, OpenImageIO.FLOAT)
         if values is None:
             raise InputError(f"{path}: expected a whole picture, found a damaged one.")
-    finally:
-        file.close()
-    whole_numbers = not spec.format.is_floating_point
+    floating = (OpenImageIO.HALF, OpenImageIO.FLOAT, OpenImageIO.DOUBLE)
+    whole_numbers = spec.format.basetype not in floating
     alpha = spec.alpha_channel if spec.alpha_channel >= 0 else None
     return image_of(values, alpha, whole_numbers, whole_numbers and not linear)
 
@@ -120,3 +123,17 @@ def image_of(values: NDArray[np.float32], alpha: int | None, whole: bool, encode
         light, top = picture.decode(light), float(picture.decode(top))
     light = np.nan_to_num(light).astype(np.float32)
     return Image(light, cover, top if whole else np.inf)
+
+
+@contextmanager
+def _own_words() -> Iterator[None]:
+    """Keeps what the libraries below print of damaged files off stderr."""
+    sys.stderr.flush()
+    ours = os.dup(2)
+    try:
+        with Path(os.devnull).open("w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+            yield
+    finally:
+        os.dup2(ours, 2)
+        os.close(ours)

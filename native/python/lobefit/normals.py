@@ -42,10 +42,11 @@ class Job:
     `pictures` are (K, rows, columns, 3) in linear light, of the same points under the K lightings;
     `mask` (rows, columns) tells which pixels show the surface. `source` is its reflectance, as
     `reflectance_of` makes it, a Measurement, or ("classic", a dict of model 'classic-phong' or
-    'classic-blinn-phong', diffuse k_d, specular k_s and exponent). With three pictures or more each pixel is estimated by itself,
-    with fewer all together, from the silhouette inward. Values of `saturation` and above only tell
-    that a pixel was at least that bright. `noise` is the standard deviation of a pixel's value; if
-    None it is estimated. `threads` 0 takes every processor; the result is the same for any number.
+    'classic-blinn-phong', diffuse k_d, specular k_s and exponent). With three pictures or more each
+    pixel is estimated by itself, with fewer all together, from the silhouette inward. Values of
+    `saturation` and above only tell that a pixel was at least that bright. `noise` is the standard
+    deviation of a pixel's value; if None it is estimated. `threads` 0 takes every processor; the
+    result is the same for any number.
     """
 
     def __init__(
@@ -207,9 +208,7 @@ def as_displacement(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], 
     return (heights / highest if highest > 0 else heights), scale
 
 
-def _floor(
-    pictures: NDArray[np.float32], mask: NDArray[np.bool_], noise: float | None
-) -> float:
+def _floor(pictures: NDArray[np.float32], mask: NDArray[np.bool_], noise: float | None) -> float:
     """Below which value noise rules."""
     bright = float(np.percentile(pictures[:, mask], 99))
     if noise is None:
