@@ -2,13 +2,14 @@
 
 import bpy
 
-from . import add_live, export, library, preview
+from . import add_live, export, library, normals, preview
 from .add_live import LOBEFIT_OT_add_live
 from .classic import LOBEFIT_OT_make_classic, LOBEFIT_OT_take_lights
 from .export import LOBEFIT_OT_export_measured
 from .fit import LOBEFIT_OT_cancel_fit, LOBEFIT_OT_fit
 from .import_measured import LOBEFIT_FH_measured, LOBEFIT_OT_import_measured, draw_menu
 from .library import LOBEFIT_OT_add_asset_library, LOBEFIT_OT_make_library
+from .normals import LOBEFIT_OT_find_normals
 from .run import current
 from .simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 
@@ -25,6 +26,7 @@ _CLASSES = (
     LOBEFIT_OT_export_measured,
     LOBEFIT_OT_make_classic,
     LOBEFIT_OT_take_lights,
+    LOBEFIT_OT_find_normals,
 )
 
 # What the operators add to menus of Blender's.
@@ -34,6 +36,7 @@ _ENTRIES = (
     ("TOPBAR_MT_file_export", export.draw_menu),
     ("NODE_MT_shader_node_add_all", add_live.draw_menu),
     ("ASSETBROWSER_MT_catalog", library.draw_catalog_menu),
+    ("IMAGE_MT_image", normals.draw_menu),
 )
 
 

@@ -30,6 +30,8 @@
 #include "fitting/naive_ceres.h"
 #include "fitting/samples.h"
 #include "fitting/variables.h"
+#include "inverse/normals.h"
+#include "inverse/shading.h"
 #include "measurement/input_error.h"
 #include "measurement/input_file.h"
 #include "measurement/instructions.h"
@@ -53,6 +55,7 @@ namespace {
 using SharedMeasurement = std::shared_ptr<Measurement>;
 using RecordJob = Job<RecordContents>;
 using ClosureJob = Job<FittedClosures>;
+using NormalsJob = Job<Normals>;
 using DirectionArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> to_list(const Rgb& rgb) { return {rgb[0], rgb[1], rgb[2]}; }
@@ -456,6 +459,97 @@ py::array_t<float> preview(const py::object& source, int size, double world) {
   return py::array_t<float>({size, size, 3}, pixels.data());
 }
 
+Rgb rgb_from(const std::array<double, 3>& list) { return {list[0], list[1], list[2]}; }
+
+// A list with a dict for each picture: `lights`, a list of pairs of direction and irradiance,
+// `ambient` and `exposure`. lobefit.lights has checked all of it.
+std::vector<Lighting> lighting_from(const py::list& pictures) {
+  std::vector<Lighting> lighting;
+  for (const py::handle picture : pictures) {
+    Lighting& each = lighting.emplace_back();
+    each.ambient = rgb_from(picture["ambient"].cast<std::array<double, 3>>());
+    each.exposure = picture["exposure"].cast<double>();
+    for (const py::handle light : picture["lights"]) {
+      const auto [direction, irradiance] =
+          light.cast<std::pair<std::array<double, 3>, std::array<double, 3>>>();
+      each.lights.push_back({Vector3(direction.data()).normalized(), rgb_from(irradiance)});
+    }
+  }
+  return lighting;
+}
+
+using MaskArray = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+// Pictures (K, rows, columns, 3) and the mask (rows, columns) of the surface.
+Pictures pictures_from(const FloatArray& values, const MaskArray& mask,
+                       std::vector<Lighting> lighting, float saturation) {
+  if (values.ndim() != 4 || values.shape(3) != 3 || mask.ndim() != 2 ||
+      values.shape(1) != mask.shape(0) || values.shape(2) != mask.shape(1)) {
+    throw InputError("pictures: expected arrays of (K, rows, columns, 3) and (rows, columns).");
+  }
+  if (values.shape(0) != static_cast<py::ssize_t>(lighting.size()) || lighting.empty()) {
+    throw InputError("pictures: expected one or more, each with its lighting.");
+  }
+  Pictures pictures{{static_cast<int>(mask.shape(0)),
+                     static_cast<int>(mask.shape(1)),
+                     {mask.data(), mask.data() + mask.size()}},
+                    std::move(lighting),
+                    {},
+                    saturation};
+  const auto one = static_cast<py::ssize_t>(3 * pictures.grid.size());
+  for (py::ssize_t k = 0; k < values.shape(0); ++k) {
+    pictures.values.emplace_back(values.data() + k * one, values.data() + (k + 1) * one);
+  }
+  return pictures;
+}
+
+std::unique_ptr<NormalsJob> start_normals_job(const FloatArray& values, const MaskArray& mask,
+                                              const py::list& lighting, const py::object& source,
+                                              double floor, float saturation, int threads) {
+  if (!(floor > 0)) throw InputError("floor: expected a value above 0.");
+  if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
+  return std::make_unique<NormalsJob>(
+      [pictures = pictures_from(values, mask, lighting_from(lighting), saturation),
+       reflectance = previewed(source), options = NormalsOptions{floor, threads}](
+          Monitor& monitor) { return estimate_normals(pictures, reflectance, options, monitor); });
+}
+
+// Normals (rows, columns, 3) and heights (rows, columns).
+py::tuple to_arrays(const Normals& found) {
+  const py::ssize_t rows = found.grid.rows, columns = found.grid.columns;
+  py::array_t<float> normals({rows, columns, py::ssize_t{3}}), heights({rows, columns});
+  float* normal = normals.mutable_data();
+  for (const Vector3& each : found.normals) {
+    normal = std::copy(each.begin(), each.end(), normal);
+  }
+  std::copy(found.heights.begin(), found.heights.end(), heights.mutable_data());
+  return py::make_tuple(normals, heights);
+}
+
+// What pixels with these normals, (N, 3), show under each lighting: (K, N, 3).
+py::array_t<float> shaded(const py::object& source, const DirectionArray& normals,
+                          const py::list& pictures) {
+  if (normals.ndim() != 2 || normals.shape(1) != 3) {
+    throw InputError("normals: expected an array of shape (N, 3).");
+  }
+  const Reflectance reflectance = previewed(source);
+  const std::vector<Lighting> lighting = lighting_from(pictures);
+  const py::ssize_t count = normals.shape(0);
+  py::array_t<float> result({static_cast<py::ssize_t>(lighting.size()), count, py::ssize_t{3}});
+  float* value = result.mutable_data();
+  const py::gil_scoped_release release;
+  const Shading shading(reflectance, lighting);
+  for (std::size_t k = 0; k < lighting.size(); ++k) {
+    for (py::ssize_t i = 0; i < count; ++i) {
+      const SeenPoint point(Vector3(normals.data() + 3 * i));
+      for (const double channel : shading.value(point, lighting[k])) {
+        *value++ = static_cast<float>(channel);
+      }
+    }
+  }
+  return result;
+}
+
 // A read-only view of the table that keeps the measurement alive.
 py::array_t<double> values_of(const SharedMeasurement& measurement) {
   py::array_t<double> view(
@@ -729,6 +823,17 @@ void bind_jobs(py::module_& module) {
   closures.def(
       "result", [](const ClosureJob& job) { return to_dict(job.result()); },
       "The closures as a dict; raises what ended the job.");
+  py::class_<NormalsJob> normals(module, "NormalsJob",
+                                 "Normals from shading, in a thread of its own.");
+  normals.def(py::init(&start_normals_job), py::arg("pictures"), py::arg("mask"),
+              py::arg("lighting"), py::arg("source"), py::arg("floor"), py::arg("saturation"),
+              py::arg("threads") = 0,
+              "Starts at once; lobefit.normals says what all of it is. source is as in preview.");
+  bind_job_methods(normals, [](NormalsJob& job) -> NormalsJob& { return job; });
+  normals.def(
+      "result", [](const NormalsJob& job) { return to_arrays(job.result()); },
+      "Normals (rows, columns, 3) in the camera's frame, 0 off the mask, and heights (rows, "
+      "columns) in pixels; raises what ended the job.");
 }
 
 // The fit and its rivals, each waited for (lobefit.methods).
@@ -841,6 +946,9 @@ void bind_functions(py::module_& module) {
              "parameters, ('live', parameters), ('principled', its dict), ('closures', an entry of "
              "a record's closures) or ('classic', a dict of model 'classic-phong' or "
              "'classic-blinn-phong', diffuse k_d, specular k_s and exponent).");
+  module.def("shade", &shaded, py::arg("source"), py::arg("normals"), py::arg("lighting"),
+             "The pixels that normals (N, 3) have under each lighting, (K, N, 3), without shadows "
+             "that other points cast; source is as in preview.");
 }
 
 }  // namespace

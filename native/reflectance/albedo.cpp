@@ -1,8 +1,21 @@
 #include "reflectance/albedo.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "measurement/parallel.h"
+
 namespace lobefit {
+namespace {
+
+// The cosine of a step of the table. Steps are dense toward grazing angles, where the albedo of
+// polished surfaces rises steeply; the horizon itself, from where nothing is seen, is left out.
+double cosine_of(int step, int steps) {
+  const double root = std::max(step, 1) / static_cast<double>(steps);
+  return root * root;
+}
+
+}  // namespace
 
 Rgb directional_albedo(const Reflectance& reflectance, double view_angle) {
   constexpr int rings = 180, sectors = 30;
@@ -27,6 +40,23 @@ Rgb directional_albedo(const Reflectance& reflectance, double view_angle) {
     }
   }
   return albedo;
+}
+
+AlbedoByCosine::AlbedoByCosine(const Reflectance& f_times_cosine) {
+  const Reflectance f = [&](const Vector3& wi, const Vector3& wo) -> Rgb {
+    return f_times_cosine(wi, wo) / wi.z();
+  };
+  parallel_for(steps + 1, thread_count(0), [&](int step) {
+    const double angle = std::acos(cosine_of(step, steps));
+    albedo_[static_cast<std::size_t>(step)] = directional_albedo(f, angle);
+  });
+}
+
+Rgb AlbedoByCosine::operator()(double view_cosine) const {
+  const double place = std::sqrt(std::clamp(view_cosine, 0.0, 1.0)) * steps;
+  const auto step = std::min(static_cast<std::size_t>(place), std::size_t{steps - 1});
+  const double share = place - static_cast<double>(step);
+  return (1 - share) * albedo_[step] + share * albedo_[step + 1];
 }
 
 }  // namespace lobefit

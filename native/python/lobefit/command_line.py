@@ -22,7 +22,9 @@ from lobefit import (
     alterations,
     blender,
     export,
+    images,
     methods,
+    normals,
     picture,
     pictures,
     preview,
@@ -44,6 +46,7 @@ from lobefit.inputs import (
     spread,
 )
 from lobefit.library import items_of, records_folder
+from lobefit.lights import in_order, read_lights
 from lobefit.origin import origin_of, write_samples
 from lobefit.phong_energy import LOBES, MOST_EXPONENT, energy
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
@@ -191,6 +194,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_simplify,
         _add_energy,
         _add_match_exponent,
+        _add_normals,
         _add_report,
         _add_diagnose,
     ):
@@ -466,6 +470,79 @@ def _add_match_exponent(commands: Any) -> None:
         metavar="DEG",
         help="between the normal and the viewer; without it, over spheres lit from everywhere",
     )
+    _add_json(command)
+
+
+def _add_normals(commands: Any) -> None:
+    command = _add(commands, _normals, "find normals and heights from shading under known lights")
+    command.add_argument(
+        "images",
+        metavar="IMAGE",
+        nargs="+",
+        help="pictures of the same points; one or two are enough where a silhouette shows",
+    )
+    command.add_argument(
+        "--lights", required=True, metavar="LIGHTS.json", help="what lit each of them; see README"
+    )
+    material = command.add_mutually_exclusive_group(required=True)
+    material.add_argument(
+        "--material",
+        metavar="FILE|RECORD.json",
+        help="what is shown: a measurement, or what --kind tells of a record",
+    )
+    material.add_argument(
+        "--classic",
+        choices=("phong", "blinn-phong"),
+        help="what is shown: the classic model with --diffuse, --specular and --exponent",
+    )
+    command.add_argument(
+        "--kind",
+        choices=normals.KINDS,
+        help="the fitted model, as for photographs, or what Cycles renders of this kind of "
+        "material; default: model",
+    )
+    for name, text in {"diffuse": "k_d", "specular": "k_s"}.items():
+        command.add_argument(
+            f"--{name}",
+            type=_within(float, 0, 1e6, "a number"),
+            nargs=3,
+            metavar=("R", "G", "B"),
+            help=f"{text} of the classic model",
+        )
+    command.add_argument(
+        "--exponent", type=_within(float, 0, 1e8, "an exponent"), metavar="N", help="of the same"
+    )
+    command.add_argument(
+        "--mask",
+        metavar="IMAGE",
+        help="bright where the surface is; default: alpha, or else what is not black",
+    )
+    command.add_argument(
+        "--linear", action="store_true", help="take files of whole numbers for linear, not for sRGB"
+    )
+    command.add_argument(
+        "--noise",
+        type=_within(float, 0, 1e6, "a value"),
+        metavar="SIGMA",
+        help="standard deviation of a pixel in linear light; default: told by the pictures",
+    )
+    command.add_argument(
+        "--saturation",
+        type=_within(float, 1e-6, 1e30, "a value"),
+        metavar="VALUE",
+        help="pixels of this linear value and more were cut off; default: full scale",
+    )
+    command.add_argument(
+        "--threads",
+        type=_within(int, 0, 1024, "a number"),
+        default=0,
+        metavar="N",
+        help="0: every processor",
+    )
+    command.add_argument(
+        "--height", metavar="FILE.png|FILE.exr", help="also the heights, for a Displacement node"
+    )
+    command.add_argument("-o", dest="output", required=True, metavar="NORMAL.png|NORMAL.exr")
     _add_json(command)
 
 
@@ -854,6 +931,72 @@ def _match_exponent(options: argparse.Namespace) -> int:
                 f"{match.error:9.4f}{match.error_of_four:18.4f}"
             )
     return DONE
+
+
+def _normals(options: argparse.Namespace) -> int:
+    images.need_library()
+    places = [options.output, *([options.height] if options.height else [])]
+    for place in places:
+        images.place_for(place)
+    names = [Path(path).name for path in options.images]
+    lighting = in_order(read_lights(options.lights), names, options.lights)
+    source = _shown_material(options)
+    pictures = normals.read_pictures(options.images, options.mask, options.linear)
+    began = time.perf_counter()
+    with progress_bar(names[0]) as progress:
+        surface = normals.normals(
+            pictures.values,
+            lighting,
+            source,
+            progress,
+            mask=pictures.mask,
+            saturation=options.saturation or pictures.saturation,
+            noise=options.noise,
+            threads=options.threads,
+        )
+    seconds = time.perf_counter() - began
+    images.write_image(options.output, normals.as_normal_map(surface.normals))
+    result = {
+        "normals": options.output,
+        "pictures": len(names),
+        "pixels": int(pictures.mask.sum()),
+        "seconds": seconds,
+    }
+    if options.height:
+        exact = options.height.lower().endswith(".exr")
+        heights, scale = normals.as_displacement(surface.heights)
+        images.write_image(options.height, heights * scale if exact else heights)
+        result |= {"height": options.height, "scale": 1.0 if exact else scale}
+    if options.json:
+        print(json.dumps(result))
+        return DONE
+    print(f"{options.output}: {result['pixels']:,} pixels, {len(names)} pictures, {seconds:.1f} s")
+    if options.height:
+        print(
+            f"{options.height}: in a Displacement node with Midlevel 0 and Scale "
+            f"{result['scale']:.4g} times the width that the picture has"
+        )
+    return DONE
+
+
+def _shown_material(options: argparse.Namespace) -> Any:
+    """The reflectance that a command line tells of, as `normals.Job` takes it."""
+    classic = {name: getattr(options, name) for name in ("diffuse", "specular", "exponent")}
+    given = [f"--{name}" for name, value in classic.items() if value is not None]
+    if options.classic:
+        missing = [f"--{name}" for name, value in classic.items() if value is None]
+        if missing or options.kind:
+            wrong = f"found no {missing[0]}" if missing else "found --kind, which is of records"
+            raise InputError(f"expected the parameters of the classic model, {wrong}.")
+        return "classic", {"model": f"classic-{options.classic}", **classic}
+    if given:
+        raise InputError(f"expected {given[0]} with --classic, found it with --material.")
+    path = Path(options.material)
+    if path.suffix.lower() == RECORD_SUFFIX:
+        return normals.reflectance_of(Record.load(path), options.kind or "model")
+    if options.kind:
+        raise InputError(f"{path}: expected a record for --kind, found another file.")
+    return read(path)
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -26,6 +26,13 @@ def encode(linear: ArrayLike) -> Image:
     return np.where(light <= 0.0031308, 12.92 * light, curve).astype(np.float32)
 
 
+def decode(encoded: ArrayLike) -> Image:
+    """The linear light (0..1) of sRGB (0..1)."""
+    curve = np.asarray(encoded, np.float32)
+    light = ((np.maximum(curve, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(curve <= 0.04045, curve / 12.92, light).astype(np.float32)
+
+
 def white_point(linear: ArrayLike, share: float = 99.5) -> float:
     """The value below which `share` percent of what is lit lies; 1 where nothing is."""
     values = np.asarray(linear)

@@ -7,7 +7,7 @@ import math
 import os
 import platform
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,18 @@ from typing import Any
 from lobefit import _native
 from lobefit._native import InputError
 from lobefit.atomic import reason, write_bytes
+from lobefit.checks import (
+    Check,
+    Mismatch,
+    Missing,
+    checked_json,
+    choice,
+    kind,
+    list_of,
+    number,
+    object_of,
+    or_null,
+)
 
 SCHEMA = 1
 MODELS = ("modified-phong", "modified-blinn-phong", "interpolated")
@@ -145,19 +157,7 @@ class Record(Fit):
     @classmethod
     def from_json(cls, text: str | bytes, name: str = "record") -> "Record":
         """The record in `text`. Raises InputError with `name`, what was expected and found."""
-        try:
-            data = json.loads(text, parse_constant=_refuse_constant)
-        except UnicodeDecodeError as error:
-            raise InputError(f"{name}: expected a record in UTF-8, found other bytes.") from error
-        except RecursionError as error:
-            raise InputError(f"{name}: expected a record, found JSON nested too deeply.") from error
-        except ValueError as error:
-            raise InputError(f"{name}: expected a record in JSON, found {error}.") from error
-        try:
-            _check_schema(data)
-            _RECORD(data, "")
-        except _Mismatch as mismatch:
-            raise InputError(f"{name}: {mismatch}.") from None
+        data = checked_json(text, name, "a record", _record)
         known = {key: data[key] for key in _names(cls) if key in data}
         known["models"] = {
             model: Fit(**{key: fit[key] for key in _names(Fit) if key in fit})
@@ -223,110 +223,38 @@ def without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-# What a record looks like: each check takes a value and where it stands, and raises _Mismatch.
-
-_Check = Callable[[Any, str], None]
-
-
-class _Mismatch(Exception):
-    def __init__(self, where: str, expected: str, found: Any) -> None:
-        shown = found if isinstance(found, _Missing) else json.dumps(found)
-        shown = f"{str(shown)[:40]}..." if len(str(shown)) > 43 else str(shown)
-        super().__init__(f"expected {where or 'the record'} to be {expected}, found {shown}")
-
-
-class _Missing:
-    def __str__(self) -> str:
-        return "nothing"
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"the constant {name}, which JSON does not have")
-
-
-def _kind(expected: str, accepts: Callable[[Any], bool]) -> _Check:
-    def check(value: Any, where: str) -> None:
-        if not accepts(value):
-            raise _Mismatch(where, expected, value)
-
-    return check
-
-
-def _is_number(value: Any) -> bool:
-    # The comparison also holds for integers that are too large for a float.
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e308
-
-
-def _number(low: float, high: float = math.inf, note: str = "a number") -> _Check:
-    return _kind(note, lambda value: _is_number(value) and low <= value <= high)
-
-
-def _choice(*names: str) -> _Check:
-    return _kind(f"one of {', '.join(names)}", lambda value: value in names)
-
-
-def _or_null(check: _Check) -> _Check:
-    def checked(value: Any, where: str) -> None:
-        if value is not None:
-            check(value, where)
-
-    return checked
-
-
-def _list(item: _Check, length: int | None = None) -> _Check:
-    expected = "a list" if length is None else f"a list of {length}"
-
-    def check(value: Any, where: str) -> None:
-        if not isinstance(value, list) or length not in (None, len(value)):
-            raise _Mismatch(where, expected, value)
-        for index, entry in enumerate(value):
-            item(entry, f"{where}[{index}]")
-
-    return check
+# What a record looks like: each check takes a value and where it stands, and raises Mismatch.
 
 
 def _curve(value: Any, where: str) -> None:
-    _list(_list(_NUMBER, 2))(value, where)
+    list_of(list_of(_NUMBER, 2))(value, where)
     cosines = [cosine for cosine, _ in value]
     if not cosines or any(a >= b for a, b in itertools.pairwise(cosines)):
-        raise _Mismatch(where, "points of rising cosine, at least one", value)
-
-
-def _object(required: dict[str, _Check], optional: dict[str, _Check] | None = None) -> _Check:
-    """An object with these keys; keys of a later version are no error."""
-
-    def check(value: Any, where: str) -> None:
-        if not isinstance(value, dict):
-            raise _Mismatch(where, "an object", value)
-        for key, item in (required | (optional or {})).items():
-            if key in value or key in required:
-                item(value.get(key, _Missing()), f"{where}.{key}" if where else key)
-
-    return check
+        raise Mismatch(where, "points of rising cosine, at least one", value)
 
 
 def _check_schema(data: Any) -> None:
     if not isinstance(data, dict):
-        raise _Mismatch("", "an object", data)
-    if data.get("schema", _Missing()) != SCHEMA:
-        raise _Mismatch("schema", f"{SCHEMA}", data.get("schema", _Missing()))
+        raise Mismatch("", "an object", data)
+    if data.get("schema", Missing()) != SCHEMA:
+        raise Mismatch("schema", f"{SCHEMA}", data.get("schema", Missing()))
 
 
 def _exponent(value: Any, where: str) -> None:
     if isinstance(value, list):
-        _list(_AMOUNT, 3)(value, where)
+        list_of(_AMOUNT, 3)(value, where)
     else:
-        _number(0, note="a number of at least 0 or a list of 3")(value, where)
+        number(0, note="a number of at least 0 or a list of 3")(value, where)
 
 
-def _fit(extra: dict[str, _Check], optional: dict[str, _Check] | None = None) -> _Check:
-    shape = _object(_FIT | extra, _FIT_EXTRAS | (optional or {}))
+def _fit(extra: dict[str, Check], optional: dict[str, Check] | None = None) -> Check:
+    shape = object_of(_FIT | extra, _FIT_EXTRAS | (optional or {}))
 
     def check(value: Any, where: str) -> None:
         shape(value, where)
         inside = f"{where}.parameters" if where else "parameters"
         parameters = value["parameters"]
-        _choice(value["model"])(parameters["model"], f"{inside}.model")
+        choice(value["model"])(parameters["model"], f"{inside}.model")
         if value["model"] == "interpolated":
             _INTERPOLATION(parameters["interpolation"], f"{inside}.interpolation")
 
@@ -335,38 +263,38 @@ def _fit(extra: dict[str, _Check], optional: dict[str, _Check] | None = None) ->
 
 def _models(value: Any, where: str) -> None:
     if not isinstance(value, dict):
-        raise _Mismatch(where, "an object", value)
+        raise Mismatch(where, "an object", value)
     for model, fit in value.items():
-        _choice(*MODELS)(model, f"the key in {where}")
-        _fit({"model": _choice(model)})(fit, f"{where}.{model}")
+        choice(*MODELS)(model, f"the key in {where}")
+        _fit({"model": choice(model)})(fit, f"{where}.{model}")
 
 
 def _angles(value: Any, where: str) -> None:
-    _list(_AMOUNT)(value, where)
+    list_of(_AMOUNT)(value, where)
     if len(value) < 2 or any(a >= b for a, b in itertools.pairwise(value)):
-        raise _Mismatch(where, "rising angles, at least two", value)
+        raise Mismatch(where, "rising angles, at least two", value)
 
 
-def _parts(*angles: str) -> _Check:
+def _parts(*angles: str) -> Check:
     """Sums over the steps of these angles; of two angles a list for each step of the first."""
 
     def check(value: Any, where: str) -> None:
-        _object({angle: _angles for angle in angles})(value, where)
+        object_of({angle: _angles for angle in angles})(value, where)
         sums = _AMOUNT
         for angle in reversed(angles):
-            sums = _list(sums, len(value[angle]) - 1)
-        _object({"misfit": sums, "measured": sums})(value, where)
+            sums = list_of(sums, len(value[angle]) - 1)
+        object_of({"misfit": sums, "measured": sums})(value, where)
 
     return check
 
 
-def _rows(rows: dict[str, _Check]) -> _Check:
+def _rows(rows: dict[str, Check]) -> Check:
     """An entry for each view angle; `rows` tells what each entry of a list is."""
 
     def check(value: Any, where: str) -> None:
-        _object({"view_angle": _list(_NUMBER)})(value, where)
+        object_of({"view_angle": list_of(_NUMBER)})(value, where)
         count = len(value["view_angle"])
-        _object({name: _list(row, count) for name, row in rows.items()})(value, where)
+        object_of({name: list_of(row, count) for name, row in rows.items()})(value, where)
 
     return check
 
@@ -381,47 +309,47 @@ def _variables_of(parameters: dict[str, Any]) -> Iterator[str]:
 
 
 def _uncertainty(value: Any, where: str) -> None:
-    _object({"low": _PARAMETERS, "high": _PARAMETERS})(value, where)
+    object_of({"low": _PARAMETERS, "high": _PARAMETERS})(value, where)
     high = set(_variables_of(value["high"]))
     known = [name for name in _variables_of(value["low"]) if name in high]
-    _object({"variables": _list(_choice(*known))})(value, where)
+    object_of({"variables": list_of(choice(*known))})(value, where)
     names = value["variables"]
-    _object(
+    object_of(
         {
             "confidence": _INTERPOLATION,
             "blocks": _COUNT,
             "seconds": _AMOUNT,
-            "undetermined": _list(_choice(*names)),
-            "correlation": _list(_list(_NUMBER, len(names)), len(names)),
+            "undetermined": list_of(choice(*names)),
+            "correlation": list_of(list_of(_NUMBER, len(names)), len(names)),
         }
     )(value, where)
 
 
-_TEXT = _kind("text", lambda value: isinstance(value, str))
-_FLAG = _kind("true or false", lambda value: isinstance(value, bool))
-_COUNT = _kind(
+_TEXT = kind("text", lambda value: isinstance(value, str))
+_FLAG = kind("true or false", lambda value: isinstance(value, bool))
+_COUNT = kind(
     "a whole number of at least 0",
     lambda value: isinstance(value, int) and not isinstance(value, bool) and value >= 0,
 )
-_NUMBER = _number(-math.inf)
-_AMOUNT = _number(0, note="a number of at least 0")
-_INTERPOLATION = _number(0, 1, "a number from 0 to 1")
-_UNKNOWN = _or_null(_NUMBER)
-_COLOR = _list(_AMOUNT, 3)
-_UNKNOWN_COLOR = _list(_UNKNOWN, 3)
-_PARAMETERS = _object(
+_NUMBER = number(-math.inf)
+_AMOUNT = number(0, note="a number of at least 0")
+_INTERPOLATION = number(0, 1, "a number from 0 to 1")
+_UNKNOWN = or_null(_NUMBER)
+_COLOR = list_of(_AMOUNT, 3)
+_UNKNOWN_COLOR = list_of(_UNKNOWN, 3)
+_PARAMETERS = object_of(
     {
-        "model": _choice(*MODELS),
+        "model": choice(*MODELS),
         "diffuse": _COLOR,
         "specular": _COLOR,
         "exponent": _exponent,
-        "interpolation": _or_null(_INTERPOLATION),
-        "ior": _or_null(_number(1, note="a number of at least 1")),
+        "interpolation": or_null(_INTERPOLATION),
+        "ior": or_null(number(1, note="a number of at least 1")),
     }
 )
-_FIGURE = _object({"pooled": _UNKNOWN, "rgb": _UNKNOWN_COLOR})
-_STAGE = _object({"name": _TEXT, "l1": _UNKNOWN, "seconds": _AMOUNT, "iterations": _COUNT})
-_PRINCIPLED = _object(
+_FIGURE = object_of({"pooled": _UNKNOWN, "rgb": _UNKNOWN_COLOR})
+_STAGE = object_of({"name": _TEXT, "l1": _UNKNOWN, "seconds": _AMOUNT, "iterations": _COUNT})
+_PRINCIPLED = object_of(
     {
         "base_color": _COLOR,
         "metallic": _INTERPOLATION,
@@ -431,28 +359,28 @@ _PRINCIPLED = _object(
         "error": _UNKNOWN,
     }
 )
-_FIT: dict[str, _Check] = {
-    "model": _choice(*MODELS),
+_FIT: dict[str, Check] = {
+    "model": choice(*MODELS),
     "parameters": _PARAMETERS,
-    "error": _object({name: _FIGURE for name in ERRORS}),
-    "stages": _list(_STAGE),
-    "seconds": _object({key: _AMOUNT for key in ("read", "start", "fit", "total")}),
+    "error": object_of({name: _FIGURE for name in ERRORS}),
+    "stages": list_of(_STAGE),
+    "seconds": object_of({key: _AMOUNT for key in ("read", "start", "fit", "total")}),
     "converged": _FLAG,
-    "certainty": _object({"starts": _COUNT, "agree": _COUNT, "spread": _UNKNOWN}),
+    "certainty": object_of({"starts": _COUNT, "agree": _COUNT, "spread": _UNKNOWN}),
     "albedo": _rows({"measured": _UNKNOWN_COLOR, "model": _UNKNOWN_COLOR}),
-    "warnings": _list(_TEXT),
+    "warnings": list_of(_TEXT),
     "principled": _PRINCIPLED,
 }
 # What records of the first builds do not have.
-_FIT_EXTRAS: dict[str, _Check] = {
-    "error_by_angle": _or_null(
-        _object({"half_difference": _parts("theta_h", "theta_d"), "view": _parts("view_angle")})
+_FIT_EXTRAS: dict[str, Check] = {
+    "error_by_angle": or_null(
+        object_of({"half_difference": _parts("theta_h", "theta_d"), "view": _parts("view_angle")})
     ),
-    "uncertainty": _or_null(_uncertainty),
+    "uncertainty": or_null(_uncertainty),
 }
-_CLOSURES = _object(
+_CLOSURES = object_of(
     {
-        "target": _choice("measured", "lobe"),
+        "target": choice("measured", "lobe"),
         "count": _COUNT,
         "cap_albedo": _FLAG,
         "error": _AMOUNT,
@@ -464,35 +392,40 @@ _CLOSURES = _object(
                 "relative_error": _AMOUNT,
             }
         ),
-        "diffuse": _list(_curve, 3),
-        "specular": _list(
-            _object(
+        "diffuse": list_of(_curve, 3),
+        "specular": list_of(
+            object_of(
                 {
-                    "distribution": _choice("ggx", "beckmann"),
+                    "distribution": choice("ggx", "beckmann"),
                     "roughness": _curve,
                     "anisotropy": _curve,
                     "bend": _curve,
-                    "weight": _list(_curve, 3),
+                    "weight": list_of(_curve, 3),
                 }
             )
         ),
     }
 )
-_BINS = _object({key: _COUNT for key in ("valid", "below_horizon", "negative", "non_finite")})
+_BINS = object_of({key: _COUNT for key in ("valid", "below_horizon", "negative", "non_finite")})
 _RECORD = _fit(
     {
-        "source": _object(
-            {"path": _or_null(_TEXT), "sha256": _or_null(_TEXT), "format": _TEXT, "bins": _BINS},
+        "source": object_of(
+            {"path": or_null(_TEXT), "sha256": or_null(_TEXT), "format": _TEXT, "bins": _BINS},
             {"name": _TEXT},
         ),
-        "schedule": _choice(*SCHEDULES),
-        "norm": _choice(*NORMS),
-        "channels": _choice("shared", "separate"),
-        "max_angle": _number(0, 90, "a number from 0 to 90"),
+        "schedule": choice(*SCHEDULES),
+        "norm": choice(*NORMS),
+        "channels": choice("shared", "separate"),
+        "max_angle": number(0, 90, "a number from 0 to 90"),
     },
     {
-        "machine": _object({"system": _TEXT, "processor": _TEXT, "threads": _COUNT}),
+        "machine": object_of({"system": _TEXT, "processor": _TEXT, "threads": _COUNT}),
         "models": _models,
-        "closures": _list(_CLOSURES),
+        "closures": list_of(_CLOSURES),
     },
 )
+
+
+def _record(data: Any, where: str) -> None:
+    _check_schema(data)
+    _RECORD(data, where)
