@@ -1,11 +1,22 @@
 """Materials and the records they carry, read also where the compiled module cannot be loaded."""
 
+import dataclasses
+import functools
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import bpy
 
+from .preferred import measured_folders
+
 KEY = "lobefit_record"
+# The schema of records that this Lobefit reads, as `lobefit.record.SCHEMA`.
+SCHEMA = 1
+# Which nodes a material was given: to be raised with any change of what is built of a record. A
+# material without it is from before they were counted.
+VERSION_KEY, VERSION = "lobefit_version", 1
 # What the material shows: its kind and the number of its specular closures.
 KIND_KEY, COUNT_KEY = "lobefit_kind", "lobefit_closures"
 # Whether light that bounced off a diffuse surface meets a diffuse closure only.
@@ -22,9 +33,40 @@ def active_material(context: bpy.types.Context) -> bpy.types.Material | None:
     return material
 
 
+def source_file(source: Mapping[str, Any]) -> str:
+    """Where the file of a record's `source` is; empty where it is not found.
+
+    If it is no longer where it was, or the record does not tell where (that of an asset), it is
+    looked for by its name beside the .blend and in the folder that the preferences tell.
+    """
+    if not source["path"]:
+        return ""
+    folders = ((bpy.path.abspath("//"),) if bpy.data.filepath else ()) + measured_folders()
+    others = [str(Path(folder) / Path(source["path"]).name) for folder in folders]
+    return next((place for place in (source["path"], *others) if Path(place).is_file()), "")
+
+
+def located(record: Any) -> Any:
+    """The `lobefit.Record` with the place in it where its measured file is found now, if it is."""
+    path = source_file(record.source)
+    if path in ("", record.source["path"]):
+        return record
+    return dataclasses.replace(record, source=record.source | {"path": path})
+
+
 def record_of(material: bpy.types.Material | None) -> dict[str, Any] | None:
-    """The entries of the record (RECORD.json) in a material, or None if it has none to be read."""
+    """The entries of the record (RECORD.json) in a material, or None if it has none to be read.
+
+    They are not to be changed: who asks again gets the same.
+    """
     try:
-        return json.loads(material[KEY])
+        return _parsed(material[KEY])
     except (KeyError, TypeError, ValueError):
         return None
+
+
+# Panels ask several times as they are drawn, and are drawn often.
+@functools.lru_cache(maxsize=8)
+def _parsed(text: str) -> dict[str, Any] | None:
+    record = json.loads(text)
+    return record if isinstance(record, dict) else None

@@ -8,8 +8,9 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import native
 from ..child import Child
+from ..preferred import library_folder
 from ..properties import LibraryOptions, draw_library_options
-from .import_measured import MEASURED_GLOB, ChoosesFiles
+from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB, ChoosesFiles
 from .run import RunsWork
 
 _made: list[Path] = []  # the folders of libraries that were made, as long as Blender runs
@@ -22,12 +23,17 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
     bl_label = "Make BRDF Library"
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
-    filter_glob: StringProperty(default=f"{MEASURED_GLOB};*.json", options={"HIDDEN"})
+    filter_glob: StringProperty(
+        default=f"{MEASURED_GLOB};*.json", options={"HIDDEN"}, description=GLOB_DESCRIPTION
+    )
     library: StringProperty(
         name="Library",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
-        description="The .blend file to write; if empty, one in the folder, named like it",
+        description=(
+            "The .blend file to write; if empty, one named like the folder, in it or where the "
+            "preferences tell"
+        ),
     )
     add_to_preferences: BoolProperty(
         name="Add to Asset Libraries",
@@ -44,7 +50,8 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
         if not sources[0].name:
             return self.refuse("Expected measured files or a folder of them, found none chosen.")
         folder = sources[0] if sources[0].is_dir() else sources[0].parent
-        library = bpy.path.abspath(self.library) or str(folder / f"{folder.name}.blend")
+        place = library_folder(folder) / f"{folder.name}.blend"
+        library = bpy.path.abspath(self.library) or str(place)
         return self.start(context, Child(self.command(list(map(str, sources)), library)))
 
     def conclude(self, context: bpy.types.Context, work: Child) -> set[str]:

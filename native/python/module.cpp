@@ -456,6 +456,13 @@ py::array_t<float> preview(const py::object& source, int size, double world) {
   return py::array_t<float>({size, size, 3}, pixels.data());
 }
 
+// What records tell as the error of closures and of the best Principled BSDF.
+double picture_error(const SharedMeasurement& measurement, const py::object& shown) {
+  const Reflectance reflectance = previewed(shown);
+  const py::gil_scoped_release release;
+  return error_of(sample_target(measured_reflectance(measurement)), reflectance);
+}
+
 // A read-only view of the table that keeps the measurement alive.
 py::array_t<double> values_of(const SharedMeasurement& measurement) {
   py::array_t<double> view(
@@ -841,6 +848,9 @@ void bind_functions(py::module_& module) {
              "parameters, ('live', parameters), ('principled', its dict), ('closures', an entry of "
              "a record's closures) or ('classic', a dict of model 'classic-phong' or "
              "'classic-blinn-phong', diffuse k_d, specular k_s and exponent).");
+  module.def("picture_error", &picture_error, py::arg("measurement"), py::arg("shown"),
+             "The mean L1 difference of pictures of a sphere over all angles between light and "
+             "viewer, relative to each; shown: what preview draws.");
 }
 
 }  // namespace

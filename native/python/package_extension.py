@@ -6,6 +6,7 @@ made and validated by the extension builder that comes with Blender.
 
 import importlib.util
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,21 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import markdown
+
 root = Path(__file__).resolve().parents[2]
+
+_PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>{title}</title>
+<style>
+:root {{ color-scheme: light dark }}
+body {{ font: 16px/1.55 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 2% }}
+img {{ max-width: 100% }} table {{ border-collapse: collapse }}
+td, th {{ padding: .25rem .8rem .25rem 0; text-align: left; border-bottom: 1px solid #8884 }}
+</style>
+{body}
+</html>
+"""
 
 
 def run_extension_builder(*arguments: str) -> None:
@@ -39,6 +54,18 @@ def build_id_of(wheel: Path) -> str:
     return answer.stdout.strip()
 
 
+def write_manual(pages: Path, output: Path) -> None:
+    """Writes the manual's Markdown pages as HTML, links between them included, and its pictures."""
+    shutil.copytree(pages, output, ignore=shutil.ignore_patterns("*.md"))
+    for page in pages.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        title = text.partition("\n")[0].removeprefix("# ")
+        body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
+        body = re.sub(r'href="([\w-]+)\.md', r'href="\1.html', body)
+        html = _PAGE.format(title=title, body=body)
+        (output / page.name).with_suffix(".html").write_text(html, encoding="utf-8")
+
+
 def package_extension(wheels: list[Path], output: Path) -> Path:
     """Writes `lobefit-VERSION-linux-x64.zip` and copies of the wheels to the folder `output`."""
     python_tag = f"cp{sys.version_info.major}{sys.version_info.minor}"
@@ -49,6 +76,9 @@ def package_extension(wheels: list[Path], output: Path) -> Path:
             root / "addon", extension, ignore=shutil.ignore_patterns("__pycache__", ".*")
         )
         shutil.copy(root / "LICENSE", extension)
+        (extension / "blend_files").mkdir()
+        shutil.copy(root / "blend_files" / "two_lights.blend", extension / "blend_files")
+        write_manual(root / "docs" / "manual", extension / "manual")
         (extension / "wheels").mkdir()
         output.mkdir(exist_ok=True)
         for wheel in wheels:

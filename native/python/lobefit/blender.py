@@ -133,6 +133,26 @@ def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]
     return pixels
 
 
+def render_materials(
+    path: str | os.PathLike[str], size: int
+) -> Iterator[tuple[str, NDArray[np.float32]]]:
+    """The measured materials of a Blender file as Cycles shows them under the two lights.
+
+    Yields each name with the radiance (size, size, 3) of a sphere. Raises InputError for a file
+    that cannot be read.
+    """
+    _open(path)
+    import bpy
+    from lobefit_addon.records import KEY
+    from lobefit_addon.scene import render_pixels, two_lights_scene
+
+    for material in [item for item in bpy.data.materials if KEY in item]:
+        with quiet():
+            scene = two_lights_scene(material, size)
+            pixels: NDArray[np.float32] = render_pixels(scene)
+        yield material.name, pixels
+
+
 def costs(record: Record) -> dict[tuple[str, int | None], float]:
     """Processor seconds a camera sample of every kind of material of a record, by kind and count.
 

@@ -6,7 +6,9 @@ progress bar to stderr.
 """
 
 import argparse
+import io
 import json
+import math
 import os
 import sys
 import time
@@ -16,6 +18,8 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
+
+import numpy as np
 
 from lobefit import (
     _native,
@@ -173,6 +177,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_fit,
         _add_closures,
         _add_preview,
+        _add_render,
         _add_material,
         _add_library,
         _add_export,
@@ -331,6 +336,26 @@ def _add_preview(commands: Any) -> None:
         help="also as classic Phong and Blinn-Phong, which old renderers and games have, show it",
     )
     command.add_argument("-o", dest="output", required=True, metavar="PICTURE.png")
+
+
+def _add_render(commands: Any) -> None:
+    command = _add(
+        commands, _render, "render the measured materials of a Blender file as spheres (needs bpy)"
+    )
+    command.add_argument("file", metavar="FILE.blend")
+    command.add_argument(
+        "--size",
+        type=_within(int, 16, 4096, "pixels"),
+        default=512,
+        help="pixels a sphere; " + _DEFAULT,
+    )
+    command.add_argument(
+        "--linear",
+        action="store_true",
+        help="NAME.npy, the radiance as float32 (rows, columns, 3), in the place of NAME.png",
+    )
+    command.add_argument("-o", dest="output", required=True, metavar="DIR")
+    _add_json(command)
 
 
 def _add_material(commands: Any) -> None:
@@ -703,6 +728,25 @@ def _preview(options: argparse.Namespace) -> int:
         picture.write_png(options.output, preview.sheet(rows, size))
         print(options.output)
     return code
+
+
+def _render(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    pixels = dict(blender.render_materials(options.file, options.size))
+    if not pixels:
+        raise InputError(f"{options.file}: expected a measured material, found none.")
+    for name, stem in export.places_in(make_folder(options.output), pixels):
+        path = stem.with_suffix(".npy" if options.linear else ".png")
+        if options.linear:
+            data = io.BytesIO()
+            np.save(data, pixels[name])
+            write_bytes(path, data.getvalue())
+        else:
+            # A white diffuse surface that faces one of the lights is white.
+            picture.write_png(path, picture.encode(picture.expose(pixels[name], 1 / math.pi)))
+        result = {"material": name, "picture": str(path)}
+        print(json.dumps(result) if options.json else path)
+    return DONE
 
 
 def _material(options: argparse.Namespace) -> int:
