@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import bpy
 
-from . import pictures
+from . import native, pictures
 from .layouts import draw_paragraph, draw_problem, draw_progress
 from .nodes.material import Choice, shown_by
 from .nodes.principled import SOCKETS
@@ -28,7 +28,7 @@ from .operators.two_lights import LOBEFIT_OT_two_lights
 from .operators.update import LOBEFIT_OT_update_materials
 from .parameters import is_edited, parameter_nodes
 from .properties import KINDS, MODELS, draw_kind_options, draw_model_options, last_options
-from .records import KIND_KEY, active_material, record_of, source_file
+from .records import KIND_KEY, active_material, damage_of, record_of, source_file
 from .versions import is_newer, is_outdated
 
 TITLE = "Measured BRDF"
@@ -60,9 +60,9 @@ class LOBEFIT_PT_measured_brdf(bpy.types.Panel):
         draw_problem(body, context)
         if current():
             draw_progress(body)
-        if is_newer(material):
-            sentence = "A later version of Lobefit made this material: it is left as it is."
-            draw_paragraph(body, sentence, "INFO", context)
+        problem = _problem_of_record(material)
+        if problem:
+            draw_paragraph(body, problem, "ERROR", context)
             return
         record = SimpleNamespace(**{"closures": [], "error_by_angle": None, **record_of(material)})
         choice = shown_by(material, record)
@@ -81,6 +81,13 @@ class LOBEFIT_PT_measured_brdf(bpy.types.Panel):
             if section is not None:
                 draw(section, context, material, record)
         body.operator(LOBEFIT_OT_open_manual.bl_idname, icon="HELP")
+
+
+def _problem_of_record(material: bpy.types.Material) -> str:
+    """Why nothing can be told of the material; empty for a record that is understood."""
+    if is_newer(material):
+        return "A later version of Lobefit made this material: it is left as it is."
+    return damage_of(material) if not native.problem() else ""
 
 
 def _draw_origin(layout: Any, context: bpy.types.Context, material: bpy.types.Material) -> None:
@@ -157,23 +164,11 @@ def _draw_error(
 
 def _energy(albedo: dict[str, list[Any]]) -> str:
     """Says where more light is reflected than arrives; empty where that is nowhere."""
-    measured, angle = _most(albedo["measured"], albedo["view_angle"])
-    if measured <= 1:
+    if native.problem():
         return ""
-    shown, _ = _most(albedo["shown"], albedo["view_angle"])
-    sentence = f"The measurement reflects {measured:.0%} of the light, seen at {angle:.0f} degrees"
-    # A capped albedo keeps to 1 but for the last digits.
-    return f"{sentence}; Cap Albedo keeps it at 100 %." if shown > 1.001 else f"{sentence}; capped."
+    from lobefit.shown import excess
 
-
-def _most(rows: list[Any], angles: list[float]) -> tuple[float, float]:
-    """The largest albedo of a channel, and at which view angle it is."""
-    known = [
-        (max(value for value in rgb if value is not None), angle)
-        for rgb, angle in zip(rows, angles, strict=False)
-        if any(value is not None for value in rgb)
-    ]
-    return max(known, default=(0.0, 0.0))
+    return excess(albedo["view_angle"], albedo["measured"], albedo["shown"])
 
 
 def _draw_kind(layout: Any, context: bpy.types.Context) -> None:

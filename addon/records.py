@@ -65,6 +65,22 @@ def record_of(material: bpy.types.Material | None) -> dict[str, Any] | None:
         return None
 
 
+def damage_of(material: bpy.types.Material) -> str:
+    """What is wrong with the record in a material, in a sentence; wants the compiled module."""
+    return _damage(material[KEY], material.name)
+
+
+@functools.lru_cache(maxsize=8)
+def _damage(text: str, name: str) -> str:
+    import lobefit
+
+    try:
+        lobefit.Record.from_json(text, name)
+    except lobefit.InputError as error:
+        return str(error)
+    return ""
+
+
 # Panels ask several times as they are drawn, and are drawn often.
 @functools.lru_cache(maxsize=8)
 def _parsed(text: str) -> dict[str, Any] | None:

@@ -197,8 +197,10 @@ class LOBEFIT_OT_render_preview(RunsWork, bpy.types.Operator):
             places = [result["picture"] for result in work.results]
             rendered = [np.load(place) for place in places if place.endswith(".npy")]
         found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
-        if not rendered or not found:
+        if not rendered:
             return {"CANCELLED"}
+        if not found:
+            return self.refuse("The material was removed while it was rendered.")
         try:
             missing = draw_spheres(found[0], rendered[0], self.size)
         except lobefit.InputError as error:

@@ -106,16 +106,21 @@ def test_grazing_error_is_that_of_the_closures(addon, material):
 def test_panel_tells_of_more_light_than_arrives(addon, on_a_cube):
     record = json.loads(on_a_cube["lobefit_record"])
     albedos = record["closures"][0]["by_view"]["target_albedo"]
-    assert max(map(max, albedos)) < 1 and "Cap Albedo" not in told(material_tab())
+    assert max(map(max, albedos)) < 1 and "measurement reflects" not in told(material_tab())
     albedos[-1] = [1.25, 1.0, 1.0]
     shown = record["closures"][0]["by_view"]["closures_albedo"]
     shown[-1] = [1.2, 1.0, 1.0]
     on_a_cube["lobefit_record"] = json.dumps(record)
-    assert "reflects 125% of the light" in told(material_tab())
-    assert "Cap Albedo keeps it" in told(material_tab())
-    shown[-1] = [1.0, 1.0, 1.0]
+    assert "reflects 125.0% of the light" in told(material_tab())
+    assert "the material at most 120.0%" in told(material_tab())
+
+
+def test_panel_of_a_damaged_record(addon, on_a_cube):
+    record = json.loads(on_a_cube["lobefit_record"])
+    del record["parameters"]["diffuse"]
     on_a_cube["lobefit_record"] = json.dumps(record)
-    assert "capped" in told(material_tab())
+    layout = material_tab()
+    assert "expected parameters.diffuse to be" in told(layout) and layout.operators == []
 
 
 # Pictures.

@@ -12,7 +12,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import partial
 from itertools import pairwise
@@ -51,6 +51,7 @@ from lobefit.library import items_of, records_folder
 from lobefit.origin import origin_of, write_samples
 from lobefit.phong_energy import LOBES, MOST_EXPONENT, energy
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
+from lobefit.shown import excess
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
@@ -556,6 +557,8 @@ def _tell_of_record(record: Record, path: Path, as_json: bool) -> None:
             print(f"   {line}")
     for entry in record.closures:
         print(f" closures: {entry['target']}, {entry['count']}, sphere error {entry['error']:.4f}")
+        if more := _excess(entry):
+            print(f"   {more}")
 
 
 def _fit_lines(fit: Fit) -> Iterator[str]:
@@ -689,10 +692,17 @@ def _print_closures(asked: Closures, record: Record, place: Path) -> None:
             f"   {entry['target']}, {entry['count']} specular ({names}): sphere error "
             f"{entry['error']:.4f}, {entry['seconds']:.2f} s"
         )
+        if more := _excess(entry):
+            print(f"     {more}")
     print(f"   principled: sphere error {record.principled['error']:.4f}")
     least = min(e["error"] for e in record.closures if e["target"] == asked.target)
     if asked.tolerance is not None and least > asked.tolerance:
         print(f"   none of {asked.target} keeps to {asked.tolerance:g}")
+
+
+def _excess(entry: Mapping[str, Any]) -> str:
+    table = entry["by_view"]
+    return excess(table["view_angle"], table["target_albedo"], table["closures_albedo"])
 
 
 def _print_fit(record: Record, place: Path) -> None:
