@@ -122,7 +122,8 @@ def _draw_spheres(layout: Any, context: bpy.types.Context, material: bpy.types.M
     row = layout.row(align=True)
     row.operator(LOBEFIT_OT_preview.bl_idname, text="Preview", icon="SHADING_RENDERED")
     row.operator(LOBEFIT_OT_render_preview.bl_idname, text="Render", icon="RENDER_STILL")
-    row.operator(LOBEFIT_OT_two_lights.bl_idname, text="Scene", icon="SCENE_DATA")
+    two_lights = LOBEFIT_OT_two_lights.bl_idname
+    row.operator_menu_enum(two_lights, "subject", text="Scene", icon="SCENE_DATA")
     if drawn is not None:
         _draw_open(row, SPHERES)
 
@@ -148,7 +149,8 @@ def _draw_error(
     choice: Choice,
 ) -> None:
     kind = {key: label for key, label, _ in KINDS}[choice.kind]
-    closures = f", {choice.count} specular closures" if choice.closures else ""
+    plural = "" if choice.count == 1 else "s"
+    closures = f", {choice.count} specular closure{plural}" if choice.closures else ""
     error, grazing = choice.error(record), choice.grazing_error(record)
     judgement = next(text for limit, text in _JUDGEMENTS if error <= limit)
     near = "" if grazing is None else f", seen at grazing angles {grazing:.1%}"

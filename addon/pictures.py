@@ -20,7 +20,10 @@ _kept: dict[tuple[int, str], "Drawn"] = {}  # by the same, but for the title
 
 @dataclass(frozen=True)
 class Drawn:
-    """Pictures that were drawn together, sRGB with rows from the top, and what is said of them."""
+    """Pictures that were drawn together, sRGB with rows from the top, and what is said of them.
+
+    A fourth channel is the share of each pixel that is covered.
+    """
 
     pictures: dict[str, np.ndarray]
     stamp: int
@@ -92,9 +95,9 @@ def unregister() -> None:
 
 
 def _for_blender(picture: np.ndarray) -> np.ndarray:
-    """An sRGB picture with its rows from the top as Blender wants it: from below, and opaque."""
+    """The picture with its rows from below, as Blender wants it, and how opaque each pixel is."""
     pixels = np.ones((*picture.shape[:2], 4), np.float32)
-    pixels[..., :3] = picture[::-1]
+    pixels[..., : picture.shape[2]] = picture[::-1]
     return pixels
 
 

@@ -47,6 +47,7 @@ def draw_spheres(
     `rendered` is what Cycles gave of it. Raises InputError where record or file cannot be read.
     """
     from lobefit import _native, preview
+    from lobefit.picture import disc
 
     record, measurement = measured(material)
     shown, caption, missing = shown_by(material, record).shown(record), "", ""
@@ -60,7 +61,8 @@ def draw_spheres(
             caption = f"As edited, {off:.1%} of the reflected light is off."
     spheres = preview.compared(measurement, shown, size, rendered)
     titles = COLUMNS if rendered is None else COLUMNS | {"cycles": RENDERED}
-    drawn = {titles[name]: picture for name, picture in spheres.items()}
+    cover = disc(size)
+    drawn = {titles[name]: np.dstack([image, cover]) for name, image in spheres.items()}
     pictures.keep(material, SPHERES, drawn, caption)
     if measurement is None:
         missing = f"{record.source['path']}: no such file, only the material is shown."

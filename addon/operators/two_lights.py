@@ -74,6 +74,8 @@ the previews, beside the measurement"""
         if reference is not None:
             _put_beside(scene, shown, reference, material.name)
         context.window.scene = scene
+        shown.select_set(True)
+        context.view_layer.objects.active = shown
         _look_through_camera(context)
         if self.render:
             if bpy.app.background:

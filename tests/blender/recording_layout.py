@@ -56,6 +56,10 @@ class RecordingLayout:
             self.menus.append(given["menu"])
         elif name == "operator":
             return self._operator(given["operator"])
+        elif name == "operator_menu_enum":
+            options = self._operator(given["operator"])
+            assert options.items(given["property"])
+            return options
         elif name == "template_icon":
             # Without a window there are no icons, and their number is 0.
             assert given["icon_value"] >= 0 and given["scale"] > 0
@@ -77,6 +81,10 @@ class _Options:
 
     def __init__(self, rna: bpy.types.Struct) -> None:
         self.__dict__["_rna"] = rna
+
+    def items(self, name: str) -> Any:
+        """The values that an option may have."""
+        return self._rna.properties[name].enum_items
 
     def __setattr__(self, name: str, value: Any) -> None:
         assert name in self._rna.properties, f"{self._rna.identifier} has no {name}"

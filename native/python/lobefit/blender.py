@@ -134,23 +134,26 @@ def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]
 
 
 def render_materials(
-    path: str | os.PathLike[str], size: int
-) -> Iterator[tuple[str, NDArray[np.float32]]]:
+    path: str | os.PathLike[str], size: int, progress: Progress | None = None
+) -> dict[str, NDArray[np.float32]]:
     """The measured materials of a Blender file as Cycles shows them under the two lights.
 
-    Yields each name with the radiance (size, size, 3) of a sphere. Raises InputError for a file
-    that cannot be read.
+    The radiance (size, size, 3) of a sphere by the name of the material. Raises InputError for a
+    file that cannot be read.
     """
     _open(path)
     import bpy
     from lobefit_addon.records import KEY
     from lobefit_addon.scene import render_pixels, two_lights_scene
 
-    for material in [item for item in bpy.data.materials if KEY in item]:
+    rendered = {}
+    materials = [item for item in bpy.data.materials if KEY in item]
+    for index, material in enumerate(materials):
+        if progress:
+            progress(index / len(materials), f"Rendering {material.name}")
         with quiet():
-            scene = two_lights_scene(material, size)
-            pixels: NDArray[np.float32] = render_pixels(scene)
-        yield material.name, pixels
+            rendered[material.name] = render_pixels(two_lights_scene(material, size))
+    return rendered
 
 
 def costs(record: Record) -> dict[tuple[str, int | None], float]:

@@ -742,7 +742,9 @@ def _preview(options: argparse.Namespace) -> int:
 
 def _render(options: argparse.Namespace) -> int:
     blender.need_blender()
-    pixels = dict(blender.render_materials(options.file, options.size))
+    bar = progress_lines if options.json else progress_bar
+    with bar(Path(options.file).name) as progress:
+        pixels = blender.render_materials(options.file, options.size, progress)
     if not pixels:
         raise InputError(f"{options.file}: expected a measured material, found none.")
     for name, stem in export.places_in(make_folder(options.output), pixels):
