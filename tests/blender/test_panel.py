@@ -25,6 +25,18 @@ def pictures(addon):
     return importlib.import_module(f"{addon.__name__}.pictures")
 
 
+@pytest.fixture(scope="session")
+def fitted(measured_file):
+    """The record of the measurement with two closures, found once for all tests."""
+    return lobefit.closures(measured_file, target="measured", count=2, norm="cosine-l1")
+
+
+@pytest.fixture
+def material(addon, fitted):
+    """A material as import makes it; there is no other in the file."""
+    return addon.build_material(fitted, "measured", "nickel")
+
+
 @pytest.fixture
 def on_a_cube(material):
     """The measured material, on an object that is active and selected."""
@@ -199,8 +211,16 @@ def test_preview_by_cycles_is_of_the_material_as_it_is(addon, on_a_cube, picture
     assert rendered[..., 0].max() > 0.1 and rendered[..., 1:3].max() < 1e-3
 
 
-@pytest.mark.parametrize("chart", ["ERROR_MAP", "LOBE", "ALBEDO"])
-@pytest.mark.parametrize("kind", ["measured", "live", "principled"])
+@pytest.mark.parametrize(
+    ("chart", "kind"),
+    [
+        ("ERROR_MAP", "measured"),
+        ("ERROR_MAP", "principled"),
+        ("LOBE", "live"),
+        ("ALBEDO", "measured"),
+        ("ALBEDO", "principled"),
+    ],
+)
 def test_charts(addon, on_a_cube, pictures, chart, kind):
     bpy.ops.lobefit.set_kind(kind=kind)
     assert bpy.ops.lobefit.draw_chart(chart=chart) == {"FINISHED"}
@@ -223,11 +243,9 @@ def test_kind_without_fitting_anew(addon, on_a_cube):
     assert {entry["count"] for entry in after.closures} == {1, 2}
 
 
-def test_kind_of_many_materials(addon, on_a_cube, measured_file):
-    bpy.ops.lobefit.import_measured(filepath=measured_file, assign=False)
+def test_kind_of_many_materials(addon, on_a_cube, fitted):
     plain = bpy.data.materials.new("plain")
-    (other,) = [m for m in bpy.data.materials if "lobefit_record" in m and m != on_a_cube]
-    outside = other.copy()
+    other, outside = (addon.build_material(fitted, "measured", name) for name in ("b", "c"))
     for material in (other, plain):
         bpy.context.object.data.materials.append(material)
     assert bpy.ops.lobefit.set_kind(kind="principled", scope="SELECTED") == {"FINISHED"}
@@ -236,9 +254,8 @@ def test_kind_of_many_materials(addon, on_a_cube, measured_file):
     assert "lobefit_kind" not in plain
 
 
-def test_kind_of_many_of_which_one_has_lost_its_file(addon, on_a_cube, measured_file):
-    bpy.ops.lobefit.import_measured(filepath=measured_file, assign=False)
-    (other,) = [m for m in bpy.data.materials if m != on_a_cube]
+def test_kind_of_many_of_which_one_has_lost_its_file(addon, on_a_cube, fitted):
+    other = addon.build_material(fitted, "measured", "other")
     record = json.loads(other["lobefit_record"])
     record["source"]["path"] = "/nowhere/gone.binary"
     other["lobefit_record"] = json.dumps(record)
