@@ -1,12 +1,16 @@
-"""The extension's page in the preferences: what is wrong with it, and what to tell of it."""
+"""The extension's page in the preferences: defaults, what is wrong with it, what to tell of it."""
 
 import platform
 from typing import ClassVar
 
 import bpy
+from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from . import native
-from .panels import draw_problem
+from .layouts import draw_problem
+from .operators.manual import LOBEFIT_OT_open_manual
+from .preferred import forget_chosen
+from .properties import KINDS
 
 
 def diagnosis() -> str:
@@ -40,14 +44,50 @@ class LOBEFIT_OT_copy_diagnostics(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _forget(_preferences: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
+    forget_chosen(context)
+
+
 class LOBEFIT_AP_preferences(bpy.types.AddonPreferences):
-    """Has no settings: those of a fit are in the panel"""
+    """What operators propose where nothing was chosen yet, and where files are"""
 
     bl_idname = __package__
 
+    kind: EnumProperty(
+        name="Kind",
+        items=KINDS,
+        default="measured",
+        description="The kind of material that import, fit and libraries propose",
+        update=_forget,
+    )
+    threads: IntProperty(
+        name="Threads",
+        default=0,
+        min=0,
+        max=1024,
+        description="How many processors fits use; 0 for all",
+        update=_forget,
+    )
+    measured_folder: StringProperty(
+        name="Measured Files",
+        subtype="DIR_PATH",
+        description="Where to look for a measured file that is not where a material was made of it",
+    )
+    library_folder: StringProperty(
+        name="Libraries",
+        subtype="DIR_PATH",
+        description="Where asset libraries are written; if empty, beside the measured files",
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         draw_problem(self.layout, context)
-        self.layout.operator(LOBEFIT_OT_copy_diagnostics.bl_idname, icon="COPYDOWN")
+        column = self.layout.column()
+        column.use_property_split = True
+        for name in ("kind", "threads", "measured_folder", "library_folder"):
+            column.prop(self, name)
+        row = self.layout.row()
+        row.operator(LOBEFIT_OT_open_manual.bl_idname, icon="HELP")
+        row.operator(LOBEFIT_OT_copy_diagnostics.bl_idname, icon="COPYDOWN")
 
 
 def register() -> None:

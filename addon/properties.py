@@ -7,9 +7,11 @@ What the user chose last lives with the operator (`operator_properties_last`) an
 from collections.abc import Sequence
 from typing import Any
 
+import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .nodes.material import BAKED
+from .preferred import take_preferred
 
 MODELS = (
     ("interpolated", "Interpolated", "A blend of the two others, and closer than both"),
@@ -33,8 +35,8 @@ KINDS = (
 )
 
 
-class _ModelOptions:
-    """What to fit, and the closures to find."""
+class _ClosureOptions:
+    """The closures to find."""
 
     count: IntProperty(
         name="Closures",
@@ -48,6 +50,17 @@ class _ModelOptions:
         default=False,
         description="Let no view angle reflect more light than arrives, as some measurements do",
     )
+    threads: IntProperty(
+        name="Threads",
+        default=0,
+        min=0,
+        max=1024,
+        description="Processors to use; 0 for all. Until it is chosen, that of the preferences",
+    )
+
+
+class _ModelOptions:
+    """What to fit."""
 
     model: EnumProperty(
         name="Model", items=MODELS, default="interpolated", description="The lobe to fit"
@@ -64,16 +77,16 @@ class _ModelOptions:
             "looked at"
         ),
     )
-    threads: IntProperty(
-        name="Threads", default=0, min=0, max=1024, description="Processors to use; 0 for all"
-    )
 
 
-class FitOptions(_ModelOptions):
-    """How to fit and what to make of it; mixed into operators."""
+class KindOptions(_ClosureOptions):
+    """What to make of a record; mixed into operators."""
 
     kind: EnumProperty(
-        name="Kind", items=KINDS, default="measured", description="What Cycles renders"
+        name="Kind",
+        items=KINDS,
+        default="measured",
+        description="What Cycles renders. Until it is chosen, the kind of the preferences",
     )
     tolerance: FloatProperty(
         name="Tolerance",
@@ -84,13 +97,11 @@ class FitOptions(_ModelOptions):
         description="How much of the reflected light the kind Auto may have off",
     )
 
-    def fit_options(self) -> dict[str, Any]:
-        """The options as `lobefit.start_fit` takes them."""
+    def closures(self) -> list[Any]:
+        """The closures to find for the kind, as `lobefit.start_fit` takes them."""
         from lobefit import closures_for
 
-        closures = closures_for(self.kind, self.count, self.tolerance / 100, self.cap_albedo)
-        names = ("model", "fresnel", "norm", "threads")
-        return {"closures": closures} | {name: getattr(self, name) for name in names}
+        return closures_for(self.kind, self.count, self.tolerance / 100, self.cap_albedo)
 
     def material_options(self) -> dict[str, Any]:
         """The options as `build_material` takes them."""
@@ -98,8 +109,25 @@ class FitOptions(_ModelOptions):
         return {"kind": self.kind, "count": count, "tolerance": self.tolerance / 100}
 
 
-def draw_fit_options(layout: Any, options: Any) -> None:
-    """Draws the options; `options` is an operator or its last properties."""
+class FitOptions(KindOptions, _ModelOptions):
+    """How to fit and what to make of it; mixed into operators."""
+
+    def fit_options(self) -> dict[str, Any]:
+        """The options as `lobefit.start_fit` takes them."""
+        take_preferred(self)
+        names = ("model", "fresnel", "norm", "threads")
+        return {"closures": self.closures()} | {name: getattr(self, name) for name in names}
+
+
+def last_options(context: bpy.types.Context, operator: Any) -> Any:
+    """The options that an operator was run with last, for a panel to draw."""
+    options = context.window_manager.operator_properties_last(operator.bl_idname)
+    take_preferred(options)
+    return options
+
+
+def draw_kind_options(layout: Any, options: Any) -> None:
+    """Draws what to make of a record; `options` is an operator or its last properties."""
     layout.prop(options, "kind")
     if options.kind in BAKED:
         layout.prop(options, "count")
@@ -107,11 +135,21 @@ def draw_fit_options(layout: Any, options: Any) -> None:
         layout.prop(options, "tolerance")
     if options.kind in (*BAKED, "auto"):
         layout.prop(options, "cap_albedo")
+
+
+def draw_model_options(layout: Any, options: Any) -> None:
+    """Draws how to fit; `options` is an operator or its last properties."""
     for name in ("model", "fresnel", "norm", "threads"):
         layout.prop(options, name)
 
 
-class LibraryOptions(_ModelOptions):
+def draw_fit_options(layout: Any, options: Any) -> None:
+    """Draws all options of a fit; `options` is an operator or its last properties."""
+    draw_kind_options(layout, options)
+    draw_model_options(layout, options)
+
+
+class LibraryOptions(_ClosureOptions, _ModelOptions):
     """How to fit the files of a library; mixed into an operator."""
 
     # `auto` judges by a tolerance, and a record does not tell whether it was made for the same.
@@ -131,6 +169,7 @@ class LibraryOptions(_ModelOptions):
 
     def command(self, sources: Sequence[str], library: str) -> list[str]:
         """The words of the command line that makes the library."""
+        take_preferred(self)
         words = ["library", *sources, "-o", library, "--json", "--kind", self.kind]
         words += ["--closures", str(self.count), "--jobs", str(self.jobs)]
         words += ["--cap-albedo"] if self.cap_albedo else []

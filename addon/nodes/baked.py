@@ -29,6 +29,11 @@ def baked_group(name: str, closures: Mapping[str, Any]) -> bpy.types.ShaderNodeT
     return group
 
 
+def is_baked(node: bpy.types.Node) -> bool:
+    """Whether a node is an instance of a baked group."""
+    return [socket.name for socket in node.inputs] == ["Tint", "Strength", "Normal"]
+
+
 def is_black(weight: Sequence[Curve]) -> bool:
     """Whether a closure with this weight would show nothing at any view angle."""
     return all(value <= 0 for curve in weight for _, value in curve)

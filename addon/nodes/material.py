@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KEY, KIND_KEY
+from ..records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KEY, KIND_KEY, VERSION, VERSION_KEY
 from .baked import baked_group
 from .live import live_group, live_inputs
 from .principled import principled_node
@@ -17,6 +17,8 @@ KINDS = ("live", "lobe", "measured", "principled", "auto")
 BAKED = ("lobe", "measured")
 # Up to which part of the light that is off `auto` takes a kind, if nothing else is asked for.
 TOLERANCE = 0.05
+# View angles from here on, in degrees, are grazing.
+GRAZING = 70.0
 # What a Principled BSDF costs, in specular closures (README, "Error against run time").
 PRINCIPLED_COST = 2.5
 
@@ -56,7 +58,8 @@ def fill_material(
     with `count` specular closures (the most the record holds, if None). `auto` takes the cheapest
     that is at most `tolerance` off. With `diffuse_bounces` Cycles takes a diffuse closure instead
     for rays that left a diffuse surface. The record goes along as JSON in the custom property
-    `lobefit_record`, and what was chosen in `lobefit_kind` and `lobefit_closures`.
+    `lobefit_record`, what was chosen in `lobefit_kind` and `lobefit_closures`, and which version of
+    the nodes was built in `lobefit_version`.
     """
     _fill(material, record, choose(record, kind, count, tolerance), diffuse_bounces)
 
@@ -127,6 +130,35 @@ class Choice:
             return record.principled["error"]
         return record.error["relative_l1_cosine"]["pooled"] or 0.0
 
+    def grazing_error(self, record: Any) -> float | None:
+        """The same of the light seen from beyond 70 degrees from the normal, where it is known."""
+        if self.closures is not None:
+            table = self.closures["by_view"]
+            errors = zip(table["view_angle"], table["relative_error"], strict=True)
+            found = [error for angle, error in errors if angle >= GRAZING]
+            return sum(found) / len(found) if found else None
+        if self.kind == "principled" or record.error_by_angle is None:
+            return None
+        view = record.error_by_angle["view"]
+        rows = zip(view["view_angle"], view["misfit"], view["measured"], strict=False)
+        beyond = [sums for start, *sums in rows if start >= GRAZING]
+        misfit, measured = (sum(column) for column in zip(*beyond, strict=True))
+        return misfit / measured if measured > 0 else None
+
+    def albedo(self, record: Any) -> dict[str, list[Any]]:
+        """By `view_angle` in degrees, of the target (`measured`) and as Cycles shows it (`shown`).
+
+        Each is three channels or None; the live kind is taken to show what was fitted, and of the
+        Principled BSDF nothing is known.
+        """
+        if self.closures is not None:
+            table = self.closures["by_view"]
+            measured, shown = table["target_albedo"], table["closures_albedo"]
+        else:
+            table = record.albedo
+            measured, shown = table["measured"], table["model"] if self.kind == "live" else []
+        return {"view_angle": table["view_angle"], "measured": measured, "shown": shown}
+
     def shown(self, record: Any) -> tuple[str, Mapping[str, Any]]:
         """What Cycles shows, as `lobefit.preview` takes it."""
         if self.closures is not None:
@@ -193,6 +225,7 @@ def _fill(material: bpy.types.Material, record: Any, choice: Choice, diffuse_bou
         _add_output(tree, "CYCLES", shader, (500.0, 300.0))
     material[KEY] = record.to_json()
     material[KIND_KEY], material[COUNT_KEY] = choice.kind, choice.count
+    material[VERSION_KEY] = VERSION
     material[BOUNCES_KEY] = diffuse_bounces and shader is not None
     # A material that is filled anew has nothing to go back to.
     material.pop(BEFORE_KEY, None)

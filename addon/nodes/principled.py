@@ -5,6 +5,15 @@ from typing import Any
 
 import bpy
 
+# The sockets of the node by the entries of a record's `principled`.
+SOCKETS = {
+    "base_color": "Base Color",
+    "metallic": "Metallic",
+    "roughness": "Roughness",
+    "ior": "IOR",
+    "specular_tint": "Specular Tint",
+}
+
 
 def principled_node(
     tree: bpy.types.NodeTree,
@@ -21,9 +30,12 @@ def principled_node(
     node = tree.nodes.new("ShaderNodeBsdfPrincipled")
     node.location = location
     node.distribution = "GGX"
-    node.inputs["Base Color"].default_value = (*principled["base_color"], 1.0)
-    node.inputs["Metallic"].default_value = principled["metallic"]
-    node.inputs["Roughness"].default_value = principled["roughness"]
-    node.inputs["IOR"].default_value = principled["ior"]
-    node.inputs["Specular Tint"].default_value = (*principled["specular_tint"], 1.0)
+    for socket, value in principled_inputs(principled).items():
+        colour = isinstance(value, list)
+        node.inputs[socket].default_value = (*value, 1.0) if colour else value
     return node
+
+
+def principled_inputs(principled: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of the node's sockets by their names."""
+    return {socket: principled[name] for name, socket in SOCKETS.items()}

@@ -27,7 +27,11 @@ class LOBEFIT_OT_export_measured(RunsWork, bpy.types.Operator):
     directory: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"}, description="Where to write"
     )
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(
+        default=True,
+        options={"HIDDEN", "SKIP_SAVE"},
+        description="Show folders only in the file browser",
+    )
     records: BoolProperty(
         name="Records", default=True, description="A .json of each material, to build it again"
     )

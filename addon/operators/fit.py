@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import bpy
 from bpy.props import StringProperty
@@ -10,8 +10,9 @@ from bpy.props import StringProperty
 from ..jobs import Outcome
 from ..locks import lock_of
 from ..nodes.material import fill_material
-from ..records import active_material, record_of
-from .import_measured import MEASURED_GLOB
+from ..records import active_material, record_of, source_file
+from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB
+from .preview import draw_spheres
 from .run import RunsFits, current
 
 
@@ -28,7 +29,9 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         options={"SKIP_SAVE"},
         description="The measured file; if empty, the one of the record",
     )
-    filter_glob: StringProperty(default=MEASURED_GLOB, options={"HIDDEN"})
+    filter_glob: StringProperty(
+        default=MEASURED_GLOB, options={"HIDDEN"}, description=GLOB_DESCRIPTION
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -44,16 +47,17 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Asks for the measured file where it is not found."""
-        path = _measured_file(record_of(active_material(context))["source"])
-        if self.filepath or (path and Path(path).is_file()):
+        source = record_of(active_material(context))["source"]
+        if self.filepath or source_file(source):
             return self.execute(context)
-        self.filepath = Path(path).name if path else ""
+        self.filepath = Path(source["path"] or "").name
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         material = active_material(context)
-        path = bpy.path.abspath(self.filepath) or _measured_file(record_of(material)["source"])
+        source = record_of(material)["source"]
+        path = bpy.path.abspath(self.filepath) or source_file(source) or source["path"]
         if not path:
             return self.refuse(f"{material.name}: its record names no file to fit.")
         self._material_uid = material.session_uid
@@ -65,14 +69,8 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         if not found:
             return "The material was removed while its fit was under way."
         fill_material(found[0], done[0].record, **self.material_options())
+        draw_spheres(found[0])
         return ""
-
-
-def _measured_file(source: dict[str, Any]) -> str:
-    """Where the file of a record is; that of an asset, which has no folder, beside the .blend."""
-    path = source["path"] or ""
-    beside = bpy.path.abspath(f"//{Path(path).name}") if bpy.data.filepath else ""
-    return beside if Path(beside).is_file() and not Path(path).is_file() else path
 
 
 class LOBEFIT_OT_cancel_fit(bpy.types.Operator):
@@ -83,6 +81,8 @@ class LOBEFIT_OT_cancel_fit(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        if current() is None:
+            cls.poll_message_set("Lobefit is not at work")
         return current() is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:

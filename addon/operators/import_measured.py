@@ -29,6 +29,7 @@ from .run import RunsFits
 
 MEASURED_SUFFIXES = (".binary", ".bsdf")
 MEASURED_GLOB = ";".join(f"*{suffix}" for suffix in MEASURED_SUFFIXES)
+GLOB_DESCRIPTION = "Which files the file browser shows"
 
 PLACES = (
     ("SLOT", "Material Slot", "Into a slot of an object, if it takes materials"),
@@ -40,9 +41,17 @@ PLACES = (
 class ChoosesFiles(ImportHelper):
     """What operators have in common that ask for several files of a folder."""
 
-    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    directory: StringProperty(
+        name="Folder",
+        subtype="DIR_PATH",
+        options={"HIDDEN", "SKIP_SAVE"},
+        description="Where the files are",
+    )
     files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+        name="Files",
+        type=bpy.types.OperatorFileListElement,
+        options={"HIDDEN", "SKIP_SAVE"},
+        description="The names of the files in the folder",
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -68,7 +77,9 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
     filename_ext = ".binary"
-    filter_glob: StringProperty(default=MEASURED_GLOB, options={"HIDDEN"})
+    filter_glob: StringProperty(
+        default=MEASURED_GLOB, options={"HIDDEN"}, description=GLOB_DESCRIPTION
+    )
     place: EnumProperty(
         name="Put Into",
         items=PLACES,

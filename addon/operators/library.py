@@ -7,8 +7,9 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from .. import native
+from ..preferred import library_folder
 from ..properties import LibraryOptions, draw_library_options
-from .import_measured import MEASURED_GLOB, ChoosesFiles
+from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB, ChoosesFiles
 from .run import RunsWork
 
 # What starts processes is loaded when it is used, so that Blender starts as soon as before.
@@ -25,12 +26,17 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
     bl_label = "Make BRDF Library"
     bl_options: ClassVar = {"REGISTER", "PRESET"}
 
-    filter_glob: StringProperty(default=f"{MEASURED_GLOB};*.json", options={"HIDDEN"})
+    filter_glob: StringProperty(
+        default=f"{MEASURED_GLOB};*.json", options={"HIDDEN"}, description=GLOB_DESCRIPTION
+    )
     library: StringProperty(
         name="Library",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
-        description="The .blend file to write; if empty, one in the folder, named like it",
+        description=(
+            "The .blend file to write; if empty, one named like the folder, in it or where the "
+            "preferences tell"
+        ),
     )
     add_to_preferences: BoolProperty(
         name="Add to Asset Libraries",
@@ -49,7 +55,8 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
         if not sources[0].name:
             return self.refuse("Expected measured files or a folder of them, found none chosen.")
         folder = sources[0] if sources[0].is_dir() else sources[0].parent
-        library = bpy.path.abspath(self.library) or str(folder / f"{folder.name}.blend")
+        place = library_folder(folder) / f"{folder.name}.blend"
+        library = bpy.path.abspath(self.library) or str(place)
         return self.start(context, Child(self.command(list(map(str, sources)), library)))
 
     def conclude(self, context: bpy.types.Context, work: "Child") -> set[str]:

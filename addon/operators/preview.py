@@ -1,38 +1,96 @@
-"""Shows a measurement beside the material that was made of it, without rendering."""
+"""Shows a measurement beside the material that was made of it: drawn at once, or by Cycles."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
-import bpy.utils.previews
+from bpy.props import EnumProperty, FloatProperty, IntProperty
 
-from .. import native
+from .. import native, pictures
 from ..nodes.material import shown_by
-from ..records import KEY, active_material, record_of
+from ..parameters import edited_shown, is_edited
+from ..records import KEY, active_material, located, record_of
+from .run import RunsWork
 
-# NumPy is loaded when it is used: it would double the time that Blender takes to start.
+# NumPy, and what starts processes, are loaded when they are used: Blender starts as soon as before.
 if TYPE_CHECKING:
     import numpy as np
 
-IMAGE = "Lobefit Preview"
+    from ..child import Child
+
+SPHERES, CHARTS = "spheres", "charts"
 COLUMNS = {"measured": "Measured", "cycles": "As in Cycles", "difference": "Error x4"}
-_SIZE = 160  # pixels a sphere
+RENDERED = "By Cycles"
+CHART_KINDS = (
+    ("ERROR_MAP", "Error Map", "Where what Cycles shows is off, by half and difference angle"),
+    (
+        "LOBE",
+        "Lobe",
+        "Reflectance in the plane of a light: measured, fitted and as Cycles shows it",
+    ),
+    ("ALBEDO", "Albedo", "How much of the light is reflected, by view angle"),
+)
 
-_icons: Any = None  # the spheres of the panel, by their material and column
+_SIZE = 192  # pixels a sphere
 
 
-class LOBEFIT_OT_preview(bpy.types.Operator):
-    """Draw a sphere under two lights: measured, as Cycles will show it, and their difference"""
+def poll_measured(cls: type, context: bpy.types.Context) -> bool:
+    """Whether the active material has a record; says so where a button is greyed out."""
+    found = record_of(active_material(context)) is not None
+    if not found:
+        cls.poll_message_set("The active material was not made from a measurement")
+    return found
 
-    bl_idname = "lobefit.preview"
-    bl_label = "Preview Measured BRDF"
-    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+def draw_spheres(
+    material: bpy.types.Material, rendered: "np.ndarray | None" = None, size: int = _SIZE
+) -> str:
+    """Draws the spheres of a measured material for the panel and says what is missing.
+
+    `rendered` is what Cycles gave of it. Raises InputError where record or file cannot be read.
+    """
+    import numpy as np
+    from lobefit import _native, preview
+    from lobefit.picture import disc
+
+    record, measurement = measured(material)
+    shown, caption, missing = shown_by(material, record).shown(record), "", ""
+    if is_edited(material, record_of(material), shown_by(material, record).kind):
+        edited = edited_shown(material, shown)
+        if edited is None and rendered is None:
+            missing = "No formula tells the material as it was edited: it is shown as fitted"
+        shown = edited or shown
+        if edited and measurement:
+            off = _native.picture_error(measurement, shown)
+            caption = f"As edited, {off:.1%} of the reflected light is off."
+    spheres = preview.compared(measurement, shown, size, rendered)
+    titles = COLUMNS if rendered is None else COLUMNS | {"cycles": RENDERED}
+    cover = disc(size)
+    drawn = {titles[name]: np.dstack([image, cover]) for name, image in spheres.items()}
+    pictures.keep(material, SPHERES, drawn, caption)
+    if measurement is None:
+        missing = f"{record.source['path']}: no such file, only the material is shown."
+    return missing
+
+
+def measured(material: bpy.types.Material) -> tuple[Any, Any]:
+    """The record in a material and the measurement it was made of, None where that is not found.
+
+    Raises InputError where one of them cannot be read.
+    """
+    import lobefit
+    from lobefit import preview
+
+    record = located(lobefit.Record.from_json(material[KEY], material.name))
+    return record, preview.measurement_of(record)
+
+
+class _Draws:
+    """What operators have in common that draw the active material without rendering."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        found = record_of(active_material(context)) is not None
-        if not found:
-            cls.poll_message_set("The active material was not made from a measurement")
-        return found
+        return poll_measured(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         problem = native.problem()
@@ -40,69 +98,163 @@ class LOBEFIT_OT_preview(bpy.types.Operator):
             self.report({"ERROR"}, problem)
             return {"CANCELLED"}
         import lobefit
-        import numpy as np
-        from lobefit import preview
 
-        material = active_material(context)
         try:
-            record = lobefit.Record.from_json(material[KEY], material.name)
-            measurement = preview.measurement_of(record)
-            shown = shown_by(material, record).shown(record)
-            row = preview.row(record, measurement, _SIZE, shown=shown)
+            missing = self.draw_picture(active_material(context))
         except lobefit.InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        spheres = {name: row.panels[name].image for name in COLUMNS if name in row.panels}
-        _fill_image(_with_alpha(np.concatenate(list(spheres.values()), axis=1)))
-        for name, sphere in spheres.items():
-            _fill_icon(_key(material, name), _with_alpha(sphere))
-        if "measured" not in row.panels:
-            self.report(
-                {"WARNING"}, f"{record.source['path']}: no such file, only the fit is shown."
-            )
+        if missing:
+            self.report({"WARNING"}, missing)
         return {"FINISHED"}
 
 
-def icons_of(material: bpy.types.Material) -> dict[str, int]:
-    """The icons of a material's preview by the title of the column; none before it is made."""
-    keys = {title: _key(material, name) for name, title in COLUMNS.items()}
-    return {title: _icons[key].icon_id for title, key in keys.items() if key in _icons}
+class LOBEFIT_OT_preview(_Draws, bpy.types.Operator):
+    """Draw a sphere under two lights: measured, as Cycles will show it, and their difference"""
+
+    bl_idname = "lobefit.preview"
+    bl_label = "Preview Measured BRDF"
+    bl_options: ClassVar = {"REGISTER"}
+
+    size: IntProperty(
+        name="Size", default=_SIZE, min=16, max=1024, description="Width of a sphere in pixels"
+    )
+
+    def draw_picture(self, material: bpy.types.Material) -> str:
+        return draw_spheres(material, size=self.size)
 
 
-def register() -> None:
-    global _icons
-    _icons = bpy.utils.previews.new()
-    bpy.utils.register_class(LOBEFIT_OT_preview)
+class LOBEFIT_OT_draw_chart(_Draws, bpy.types.Operator):
+    """Draw where the active material is off, its lobe, or how much light it reflects"""
+
+    bl_idname = "lobefit.draw_chart"
+    bl_label = "Draw Chart"
+    bl_options: ClassVar = {"REGISTER"}
+
+    chart: EnumProperty(
+        name="Chart", items=CHART_KINDS, default="ERROR_MAP", description="What to draw"
+    )
+    incidence: FloatProperty(
+        name="Light Angle",
+        default=45.0,
+        min=0.0,
+        max=89.0,
+        description="Degrees between the normal and the light, for the chart Lobe",
+    )
+
+    def draw_picture(self, material: bpy.types.Material) -> str:
+        from lobefit import charts
+
+        record, measurement = measured(material)
+        choice = shown_by(material, record)
+        shown = edited_shown(material, choice.shown(record)) or choice.shown(record)
+        missing = "" if measurement else "The measured file is not found: the fitted lobe is drawn"
+        if self.chart == "ERROR_MAP":
+            picture = charts.draw_error_map(record, measurement, shown)
+        elif self.chart == "LOBE":
+            picture = charts.draw_lobe(record, measurement, shown, self.incidence)
+        else:
+            picture, missing = charts.draw_albedo(choice.albedo(record)), ""
+        titles = {key: label for key, label, _ in CHART_KINDS}
+        pictures.keep(material, CHARTS, {titles[self.chart]: picture})
+        return missing
 
 
-def unregister() -> None:
-    bpy.utils.unregister_class(LOBEFIT_OT_preview)
-    bpy.utils.previews.remove(_icons)
+class LOBEFIT_OT_render_preview(RunsWork, bpy.types.Operator):
+    """Render the active material under the two lights by Cycles, in another Blender meanwhile"""
+
+    bl_idname = "lobefit.render_preview"
+    bl_label = "Render Preview"
+    bl_options: ClassVar = {"REGISTER"}
+
+    size: IntProperty(
+        name="Size", default=_SIZE, min=16, max=1024, description="Width of a sphere in pixels"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_measured(cls, context) and super().poll(context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self.execute(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        problem = native.problem()
+        if problem:
+            return self.refuse(problem)
+        import tempfile
+
+        from lobefit.preview import FINER_AT_ONCE
+
+        from ..child import Child
+
+        material = active_material(context)
+        self._material_uid = material.session_uid
+        # The other Blender reads a file of the material as it is now, saved or not.
+        self._folder = tempfile.TemporaryDirectory(prefix="lobefit-")
+        folder = Path(self._folder.name)
+        bpy.data.libraries.write(str(folder / "material.blend"), {material})
+        size = str(self.size * FINER_AT_ONCE)
+        words = ["render", str(folder / "material.blend"), "--size", size, "--linear", "--json"]
+        return self.start(context, Child([*words, "-o", str(folder)]))
+
+    def conclude(self, context: bpy.types.Context, work: "Child") -> set[str]:
+        import lobefit
+        import numpy as np
+
+        with self._folder:
+            for problem in work.problems:
+                self.report({"ERROR"}, problem)
+            places = [result["picture"] for result in work.results]
+            rendered = [np.load(place) for place in places if place.endswith(".npy")]
+        found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
+        if not rendered:
+            return {"CANCELLED"}
+        if not found:
+            return self.refuse("The material was removed while it was rendered.")
+        try:
+            missing = draw_spheres(found[0], rendered[0], self.size)
+        except lobefit.InputError as error:
+            return self.refuse(str(error))
+        if missing:
+            self.report({"WARNING"}, missing)
+        return {"FINISHED"}
 
 
-def _key(material: bpy.types.Material, name: str) -> str:
-    return f"{material.session_uid} {name}"
+class LOBEFIT_OT_open_picture(bpy.types.Operator):
+    """Show the spheres or the chart of the active material in an Image Editor, large"""
 
+    bl_idname = "lobefit.open_picture"
+    bl_label = "Open Picture"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
 
-def _with_alpha(picture: "np.ndarray") -> "np.ndarray":
-    """An sRGB picture with its rows from the top as Blender wants it: from below, and opaque."""
-    import numpy as np
+    picture: EnumProperty(
+        name="Picture",
+        items=(
+            (SPHERES, "Spheres", "The spheres under two lights"),
+            (CHARTS, "Chart", "The chart that was drawn last"),
+        ),
+        default=SPHERES,
+        description="Which of the pictures of the panel",
+    )
 
-    pixels = np.ones((*picture.shape[:2], 4), np.float32)
-    pixels[..., :3] = picture[::-1]
-    return pixels
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        material = active_material(context)
+        found = any(material and pictures.kept(material, place) for place in (SPHERES, CHARTS))
+        if not found:
+            cls.poll_message_set("Nothing was drawn of the active material yet")
+        return bool(found)
 
-
-def _fill_image(pixels: "np.ndarray") -> None:
-    rows, columns = pixels.shape[:2]
-    image = bpy.data.images.get(IMAGE) or bpy.data.images.new(IMAGE, columns, rows)
-    if tuple(image.size) != (columns, rows):
-        image.scale(columns, rows)
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-
-
-def _fill_icon(key: str, pixels: "np.ndarray") -> None:
-    icon = _icons[key] if key in _icons else _icons.new(key)
-    icon.image_size = pixels.shape[1], pixels.shape[0]
-    icon.image_pixels_float.foreach_set(pixels.ravel())
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        drawn = pictures.kept(active_material(context), self.picture)
+        if drawn is None:
+            self.report({"ERROR"}, "Expected a picture that was drawn before, found none.")
+            return {"CANCELLED"}
+        image = pictures.as_image(drawn)
+        if not bpy.app.background:
+            bpy.ops.wm.window_new()
+            area = context.window_manager.windows[-1].screen.areas[0]
+            area.type = "IMAGE_EDITOR"
+            area.spaces.active.image = image
+        return {"FINISHED"}

@@ -69,6 +69,8 @@ class LOBEFIT_OT_restore_scene(bpy.types.Operator):
         if not any(map(is_simplified, bpy.data.materials)):
             cls.poll_message_set("No material of the file was simplified")
             return False
+        if current():
+            cls.poll_message_set("Lobefit is at work: wait for it or cancel it")
         return current() is None
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -550,6 +550,13 @@ py::array_t<float> shaded(const py::object& source, const DirectionArray& normal
   return result;
 }
 
+// What records tell as the error of closures and of the best Principled BSDF.
+double picture_error(const SharedMeasurement& measurement, const py::object& shown) {
+  const Reflectance reflectance = previewed(shown);
+  const py::gil_scoped_release release;
+  return error_of(sample_target(measured_reflectance(measurement)), reflectance);
+}
+
 // A read-only view of the table that keeps the measurement alive.
 py::array_t<double> values_of(const SharedMeasurement& measurement) {
   py::array_t<double> view(
@@ -949,6 +956,9 @@ void bind_functions(py::module_& module) {
   module.def("shade", &shaded, py::arg("source"), py::arg("normals"), py::arg("lighting"),
              "The pixels that normals (N, 3) have under each lighting, (K, N, 3), without shadows "
              "that other points cast; source is as in preview.");
+  module.def("picture_error", &picture_error, py::arg("measurement"), py::arg("shown"),
+             "The mean L1 difference of pictures of a sphere over all angles between light and "
+             "viewer, relative to each; shown: what preview draws.");
 }
 
 }  // namespace

@@ -17,6 +17,8 @@ import zipfile
 from pathlib import Path
 from platform import machine
 
+import markdown
+
 root = Path(__file__).resolve().parents[2]
 
 # Blender's name of a platform by the last tag of a wheel.
@@ -29,6 +31,18 @@ _PLATFORMS = {
     r"win_arm64": "windows-arm64",
 }
 _OWN_PLATFORM = {"x86_64": "linux-x64", "aarch64": "linux-arm64"}[machine()]
+
+_PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>{title}</title>
+<style>
+:root {{ color-scheme: light dark }}
+body {{ font: 16px/1.55 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 2% }}
+img {{ max-width: 100% }} table {{ border-collapse: collapse }}
+td, th {{ padding: .25rem .8rem .25rem 0; text-align: left; border-bottom: 1px solid #8884 }}
+</style>
+{body}
+</html>
+"""
 
 
 def run_extension_builder(*arguments: str) -> None:
@@ -77,6 +91,18 @@ def repack(package: Path) -> None:
             archive.writestr(entry, content, method, compresslevel=9)
 
 
+def write_manual(pages: Path, output: Path) -> None:
+    """Writes the manual's Markdown pages as HTML, links between them included, and its pictures."""
+    shutil.copytree(pages, output, ignore=shutil.ignore_patterns("*.md"))
+    for page in pages.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        title = text.partition("\n")[0].removeprefix("# ")
+        body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
+        body = re.sub(r'href="([\w-]+)\.md', r'href="\1.html', body)
+        html = _PAGE.format(title=title, body=body)
+        (output / page.name).with_suffix(".html").write_text(html, encoding="utf-8")
+
+
 def package_extension(platform: str, wheels: list[Path], build_id: str, output: Path) -> Path:
     """Writes `lobefit-VERSION-PLATFORM.zip` to the folder `output`."""
     with tempfile.TemporaryDirectory() as folder:
@@ -86,6 +112,9 @@ def package_extension(platform: str, wheels: list[Path], build_id: str, output: 
         )
         shutil.copy(root / "LICENSE", extension)
         shutil.copytree(root / "native" / "third_party" / "licenses", extension / "licenses")
+        (extension / "blend_files").mkdir()
+        shutil.copy(root / "blend_files" / "two_lights.blend", extension / "blend_files")
+        write_manual(root / "docs" / "manual", extension / "manual")
         (extension / "wheels").mkdir()
         for wheel in wheels:
             shutil.copy(wheel, extension / "wheels")

@@ -6,79 +6,34 @@ from types import SimpleNamespace
 import bpy
 import lobefit
 import lobefit._native
-import lobefit.preview
 import pytest
+from recording_layout import RecordingLayout, drawn, material_tab
 
 OPERATORS = [
     "add_asset_library",
     "add_live",
     "cancel_fit",
     "copy_diagnostics",
+    "draw_chart",
+    "edit_parameters",
     "export_measured",
     "fit",
     "import_measured",
     "make_classic",
     "make_library",
+    "open_manual",
+    "open_picture",
     "preview",
+    "relink",
+    "render_preview",
+    "reset_parameters",
     "restore_scene",
+    "set_kind",
     "simplify_scene",
     "take_lights",
+    "two_lights",
+    "update_materials",
 ]
-
-
-class Recorder:
-    """Stands in for a layout: draws nothing, and refuses names that Blender would not find."""
-
-    def __init__(self):
-        self.texts, self.operators, self.properties = [], [], []
-        self.icons = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
-
-    def _nested(self, **_options):
-        return self
-
-    row = column = split = box = _nested
-
-    def panel(self, _idname):
-        return self, self
-
-    def label(self, text="", icon="NONE"):
-        assert icon in self.icons
-        self.texts.append(text)
-
-    def prop(self, data, name, **_options):
-        assert name in data.bl_rna.properties
-        self.properties.append(name)
-
-    def operator(self, idname, text="", icon="NONE"):
-        assert icon in self.icons
-        area, name = idname.split(".")
-        getattr(getattr(bpy.ops, area), name).get_rna_type()
-        self.operators.append(name)
-
-    def progress(self, factor, text):
-        assert 0 <= factor <= 1
-        self.texts.append(text)
-
-    def separator(self):
-        pass
-
-    def template_icon(self, icon_value, scale):
-        # Without a window there are no icons, and their number is 0.
-        assert icon_value >= 0 and scale > 0
-
-
-def draw_panel(**context):
-    """The panel that the Material tab shows with these members in the context, drawn."""
-    layout = Recorder()
-    panels = [bpy.types.LOBEFIT_PT_measured_brdf, bpy.types.LOBEFIT_PT_import_measured]
-    with bpy.context.temp_override(**context):
-        (shown,) = [panel for panel in panels if panel.poll(bpy.context)]
-
-        class Drawn(SimpleNamespace):
-            draw = shown.draw
-
-        Drawn(layout=layout).draw(bpy.context)
-    return layout
 
 
 @pytest.fixture
@@ -147,7 +102,7 @@ def test_unregister_ends_a_fit(addon, measured_file):
     batch.advance(0.0)
     run._current = run.Run(bpy.context, batch)
     try:
-        assert draw_panel().operators == ["cancel_fit"]
+        assert material_tab().operators == ["cancel_fit"]
         assert not bpy.ops.lobefit.import_measured.poll()
     finally:
         addon.unregister()
@@ -156,50 +111,14 @@ def test_unregister_ends_a_fit(addon, measured_file):
 
 
 def test_panel_without_a_material(addon):
-    layout = draw_panel()
+    layout = material_tab()
     assert layout.operators == ["import_measured", "make_classic"]
     assert "No material is selected" in " ".join(layout.texts)
 
 
 def test_panel_with_another_material(addon):
-    layout = draw_panel(material=bpy.data.materials.new("plain"))
+    layout = material_tab(material=bpy.data.materials.new("plain"))
     assert layout.operators == ["import_measured", "make_classic"]
-
-
-def test_panel_with_a_measured_material(addon, material):
-    layout = draw_panel(material=material)
-    assert layout.operators == ["fit", "preview"]
-    assert layout.properties == [
-        "kind",
-        "count",
-        "cap_albedo",
-        "model",
-        "fresnel",
-        "norm",
-        "threads",
-    ]
-    assert "% of the reflected light" in " ".join(layout.texts)
-
-
-def test_panel_shows_the_preview(addon, material):
-    with bpy.context.temp_override(material=material):
-        assert bpy.ops.lobefit.preview() == {"FINISHED"}
-    image = bpy.data.images["Lobefit Preview"]
-    assert image.size[0] == 3 * image.size[1]
-    titles = ["Measured", "As in Cycles", f"Error x{lobefit.preview.AMPLIFIED}"]
-    assert draw_panel(material=material).texts[-3:] == titles
-    assert titles[0] not in draw_panel(material=bpy.data.materials.new("other")).texts
-
-
-def drawn(panel, context=None):
-    """A panel, drawn."""
-
-    class Drawn(SimpleNamespace):
-        draw = panel.draw
-
-    layout = Recorder()
-    Drawn(layout=layout).draw(context or bpy.context)
-    return layout
 
 
 class _Executed(SimpleNamespace):
@@ -223,7 +142,9 @@ def copied(addon):
 
 
 def test_preferences_copy_diagnostics(addon, copied):
-    assert drawn(addon.preferences.LOBEFIT_AP_preferences).operators == ["copy_diagnostics"]
+    layout = drawn(addon.preferences.LOBEFIT_AP_preferences)
+    assert layout.operators == ["open_manual", "copy_diagnostics"]
+    assert layout.properties == ["kind", "threads", "measured_folder", "library_folder"]
     text = copied()
     assert bpy.app.version_string in text and lobefit._native.build_id in text
     assert text.count("passed") == 3 and "FAILED" not in text
@@ -258,10 +179,9 @@ def test_panel_of_the_shader_editor(addon, measured_file):
     panel, tree = bpy.types.LOBEFIT_PT_shader_editor, bpy.data.materials.new("plain").node_tree
     tree = tree or bpy.data.node_groups.new("tree", "ShaderNodeTree")
     node = addon.nodes.material.add_to_tree(tree, lobefit.fit(measured_file), (0, 0))
-    members = {name: getattr(bpy.context, name) for name in ("region", "preferences")}
-    empty = drawn(panel, SimpleNamespace(active_node=None, **members))
+    empty = drawn(panel, active_node=None)
     assert empty.operators == ["import_measured", "add_live"] and not empty.texts
-    layout = drawn(panel, SimpleNamespace(active_node=node, **members))
+    layout = drawn(panel, active_node=node)
     assert layout.operators == empty.operators
     assert "% of the reflected light" in " ".join(layout.texts)
 
@@ -275,7 +195,7 @@ def test_every_panel_and_menu_entry_is_drawn(addon):
         type="NODE_EDITOR", tree_type="ShaderNodeTree", shader_type="OBJECT", params=None
     )
     for function in filter(lambda function: _is_of(addon, function), drawing_functions()):
-        layout = Recorder()
+        layout = RecordingLayout()
         function(SimpleNamespace(layout=layout), SimpleNamespace(space_data=space))
         assert layout.operators or function.__name__ == "_draw_status"
 
@@ -283,7 +203,7 @@ def test_every_panel_and_menu_entry_is_drawn(addon):
 def test_without_the_compiled_module(native, monkeypatch, measured_file):
     monkeypatch.setitem(sys.modules, "lobefit", None)
     assert "is not installed" in native.problem()
-    assert native.problem() in " ".join(draw_panel().texts)
+    assert native.problem() in " ".join(material_tab().texts)
     with pytest.raises(RuntimeError, match="is not installed"):
         bpy.ops.lobefit.import_measured(filepath=measured_file)
     assert not bpy.data.materials

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import PATIENCE, await_that, finished, refuse, start
-from lobefit import InputError, Record, catalogues, closures, preview
+from lobefit import InputError, Record, _native, catalogues, closures, preview
 from lobefit.catalogues import Catalogues
 from lobefit.command_line import main
 from lobefit.library import UNKNOWN, UNSORTED, items_of
@@ -423,3 +423,20 @@ def test_export_refuses_what_it_cannot_do(tmp_path, blend, capfd):
     capfd.readouterr()
     assert "found none" in refuse(capfd, "export", damaged, "-o", tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+def test_render_shows_each_measured_material(tmp_path, blend, fitted, capfd):
+    arguments = ["render", str(blend), "--size", "48", "-o"]
+    assert main([*arguments, str(tmp_path / "out"), "--linear", "--json"]) == 0
+    lines = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    told = [line for line in lines if "progress" not in line]
+    assert [item["material"] for item in told] == ["a/b", "a:b"]
+    entry = max(fitted.closures, key=lambda entry: entry["count"])
+    formula = _native.preview(("closures", entry), 48)
+    for item in told:
+        rendered = np.load(item["picture"])
+        # The facets of the mesh move a highlight by a small part of a pixel; see test_two_lights.
+        assert np.abs(rendered - formula).sum() < 0.03 * formula.sum()
+    assert main([*arguments, str(tmp_path / "png")]) == 0
+    assert sorted(os.listdir(tmp_path / "png")) == ["a_b-2.png", "a_b.png"]
+    assert "no such file" in refuse(capfd, "render", tmp_path / "gone.blend", "-o", tmp_path)

@@ -1,7 +1,9 @@
 """How a fit goes with the angles, for the report: curves, and where the error stands."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ _VIEWS = np.arange(-89.0, 90.0)
 # Around the mirror direction the highlight of polished metal is narrower than a step of these.
 _NEAR_MIRROR = np.array([0.1, 0.25, 0.5, 0.75])
 _INK = "var(--ink)"
+_CHANNELS = (("red", "#c8402f"), ("green", "#3b8f3e"), ("blue", "#3166c4"))
+
+Reflectance = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
 def section(record: Record, colors: Mapping[str, str]) -> str:
@@ -26,7 +31,9 @@ def section(record: Record, colors: Mapping[str, str]) -> str:
     fits = {model: fit for model, fit in record.fits.items() if fit.error_by_angle}
     if fits:
         maps = [
-            f"<div><p>{preview.TITLES[model]}</p>{_map(fit)}</div>" for model, fit in fits.items()
+            f"<div><p>{preview.TITLES[model]}</p>"
+            f"{error_map(fit.error_by_angle['half_difference'])}</div>"
+            for model, fit in fits.items()
         ]
         views = [_by_view(model, fit, colors[model]) for model, fit in fits.items()]
         parts += [
@@ -44,33 +51,47 @@ def section(record: Record, colors: Mapping[str, str]) -> str:
 
 def _curves(record: Record, colors: Mapping[str, str]) -> str:
     measurement = preview.measurement_of(record)
+    curves: dict[str, Reflectance] = {"measured": measurement.evaluate} if measurement else {}
+    for model, fit in record.fits.items():
+        curves[model] = partial(_native.evaluate_model, fit.parameters)
     plots, lines = [], []
     for incidence in INCIDENCES:
-        near = np.concatenate([incidence - _NEAR_MIRROR, incidence + _NEAR_MIRROR])
-        views = np.sort(np.concatenate([_VIEWS, near]))
-        viewers = _in_plane(views)
-        lights = np.broadcast_to(_in_plane(np.array([-incidence])), viewers.shape)
-        values = {}
-        if measurement:
-            values["measured"] = measurement.evaluate(lights, viewers)
-        for model, fit in record.fits.items():
-            values[model] = _native.evaluate_model(fit.parameters, lights, viewers)
-        lines = [
-            Line(preview.TITLES[name], views, _known(f), colors.get(name, _INK), name != "measured")
-            for name, f in values.items()
-        ]
-        drawn = plot(
-            lines,
-            f"view angle in degrees, light at {incidence:g}",
-            "f in 1/sr",
-            x_ticks=range(-90, 91, 30),
-            log=True,
-        )
-        plots.append(f"<div>{drawn}</div>")
+        lines = plane_lines(curves, incidence, colors)
+        plots.append(f"<div>{plane_plot(lines, incidence)}</div>")
     return (
         f'<div class="side">{"".join(plots)}</div>{legend(lines)}<p class="faint">Mean of the '
         "three channels; the mirror direction is at the positive angle of the light.</p>"
     )
+
+
+def plane_lines(
+    curves: Mapping[str, Reflectance], incidence: float, colors: Mapping[str, str]
+) -> list[Line]:
+    """The mean of f's channels over the view angles in the plane of a light at `incidence` degrees.
+
+    `curves` tells f by the columns of `preview.TITLES`; each has the color of its column.
+    """
+    near = np.concatenate([incidence - _NEAR_MIRROR, incidence + _NEAR_MIRROR])
+    views = np.sort(np.concatenate([_VIEWS, near]))
+    views = views[np.abs(views) < 90]
+    viewers = _in_plane(views)
+    lights = np.broadcast_to(_in_plane(np.array([-incidence])), viewers.shape)
+    return [
+        Line(
+            preview.TITLES[name],
+            views,
+            _known(f(lights, viewers)),
+            colors.get(name, _INK),
+            name != "measured",
+        )
+        for name, f in curves.items()
+    ]
+
+
+def plane_plot(lines: Sequence[Line], incidence: float, **options: Any) -> str:
+    """An SVG of what `plane_lines` gives; `options` are those of `plot`."""
+    title = f"view angle in degrees, light at {incidence:g}"
+    return plot(lines, title, "f in 1/sr", x_ticks=range(-90, 91, 30), log=True, **options)
 
 
 def _in_plane(angles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -87,8 +108,8 @@ def _ratio(misfit: float, measured: float) -> float | None:
     return misfit / measured if measured > 0 else None
 
 
-def _map(fit: Fit) -> str:
-    parts = fit.error_by_angle["half_difference"]
+def error_map(parts: Mapping[str, Any]) -> str:
+    """A heat map of `half_difference` of a record's `error_by_angle`, or of what is like it."""
     theta_h, theta_d = parts["theta_h"], parts["theta_d"]
     errors = [
         [_ratio(*sums) for sums in zip(*rows, strict=True)]
@@ -105,6 +126,23 @@ def _map(fit: Fit) -> str:
         )
 
     return heat_map(theta_h, theta_d, errors, describe)
+
+
+def albedo_lines(
+    view_angles: Sequence[float], albedos: Mapping[str, Sequence[Sequence[float | None]]]
+) -> list[Line]:
+    """The albedo of each channel over the view angle, by what it is of; the last is dashed."""
+    last = list(albedos)[-1]
+    return [
+        Line(f"{kind}, {channel}", view_angles, [rgb[index] for rgb in rows], color, kind == last)
+        for kind, rows in albedos.items()
+        for index, (channel, color) in enumerate(_CHANNELS)
+    ]
+
+
+def albedo_plot(lines: Sequence[Line], **options: Any) -> str:
+    """An SVG of what `albedo_lines` gives; `options` are those of `plot`."""
+    return plot(lines, "view angle in degrees", "albedo", x_ticks=range(0, 91, 15), **options)
 
 
 def _by_view(model: str, fit: Fit, color: str) -> Line:

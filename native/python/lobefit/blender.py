@@ -138,6 +138,29 @@ def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]
     return pixels
 
 
+def render_materials(
+    path: str | os.PathLike[str], size: int, progress: Progress | None = None
+) -> dict[str, NDArray[np.float32]]:
+    """The measured materials of a Blender file as Cycles shows them under the two lights.
+
+    The radiance (size, size, 3) of a sphere by the name of the material. Raises InputError for a
+    file that cannot be read.
+    """
+    _open(path)
+    import bpy
+    from lobefit_addon.records import KEY
+    from lobefit_addon.scene import render_pixels, two_lights_scene
+
+    rendered = {}
+    materials = [item for item in bpy.data.materials if KEY in item]
+    for index, material in enumerate(materials):
+        if progress:
+            progress(index / len(materials), f"Rendering {material.name}")
+        with quiet():
+            rendered[material.name] = render_pixels(two_lights_scene(material, size))
+    return rendered
+
+
 def costs(record: Record) -> dict[tuple[str, int | None], float]:
     """Processor seconds a camera sample of every kind of material of a record, by kind and count.
 

@@ -6,16 +6,20 @@ progress bar to stderr.
 """
 
 import argparse
+import io
 import json
+import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
+
+import numpy as np
 
 from lobefit import (
     _native,
@@ -50,6 +54,7 @@ from lobefit.lights import in_order, read_lights
 from lobefit.origin import origin_of, write_samples
 from lobefit.phong_energy import LOBES, MOST_EXPONENT, energy
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
+from lobefit.shown import excess
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
@@ -188,6 +193,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_fit,
         _add_closures,
         _add_preview,
+        _add_render,
         _add_material,
         _add_library,
         _add_export,
@@ -347,6 +353,26 @@ def _add_preview(commands: Any) -> None:
         help="also as classic Phong and Blinn-Phong, which old renderers and games have, show it",
     )
     command.add_argument("-o", dest="output", required=True, metavar="PICTURE.png")
+
+
+def _add_render(commands: Any) -> None:
+    command = _add(
+        commands, _render, "render the measured materials of a Blender file as spheres (needs bpy)"
+    )
+    command.add_argument("file", metavar="FILE.blend")
+    command.add_argument(
+        "--size",
+        type=_within(int, 16, 4096, "pixels"),
+        default=512,
+        help="pixels a sphere; " + _DEFAULT,
+    )
+    command.add_argument(
+        "--linear",
+        action="store_true",
+        help="NAME.npy, the radiance as float32 (rows, columns, 3), in the place of NAME.png",
+    )
+    command.add_argument("-o", dest="output", required=True, metavar="DIR")
+    _add_json(command)
 
 
 def _add_material(commands: Any) -> None:
@@ -620,6 +646,8 @@ def _tell_of_record(record: Record, path: Path, as_json: bool) -> None:
             print(f"   {line}")
     for entry in record.closures:
         print(f" closures: {entry['target']}, {entry['count']}, sphere error {entry['error']:.4f}")
+        if more := _excess(entry):
+            print(f"   {more}")
 
 
 def _fit_lines(fit: Fit) -> Iterator[str]:
@@ -753,10 +781,17 @@ def _print_closures(asked: Closures, record: Record, place: Path) -> None:
             f"   {entry['target']}, {entry['count']} specular ({names}): sphere error "
             f"{entry['error']:.4f}, {entry['seconds']:.2f} s"
         )
+        if more := _excess(entry):
+            print(f"     {more}")
     print(f"   principled: sphere error {record.principled['error']:.4f}")
     least = min(e["error"] for e in record.closures if e["target"] == asked.target)
     if asked.tolerance is not None and least > asked.tolerance:
         print(f"   none of {asked.target} keeps to {asked.tolerance:g}")
+
+
+def _excess(entry: Mapping[str, Any]) -> str:
+    table = entry["by_view"]
+    return excess(table["view_angle"], table["target_albedo"], table["closures_albedo"])
 
 
 def _print_fit(record: Record, place: Path) -> None:
@@ -792,6 +827,27 @@ def _preview(options: argparse.Namespace) -> int:
         picture.write_png(options.output, preview.sheet(rows, size))
         print(options.output)
     return code
+
+
+def _render(options: argparse.Namespace) -> int:
+    blender.need_blender()
+    bar = progress_lines if options.json else progress_bar
+    with bar(Path(options.file).name) as progress:
+        pixels = blender.render_materials(options.file, options.size, progress)
+    if not pixels:
+        raise InputError(f"{options.file}: expected a measured material, found none.")
+    for name, stem in export.places_in(make_folder(options.output), pixels):
+        path = stem.with_suffix(".npy" if options.linear else ".png")
+        if options.linear:
+            data = io.BytesIO()
+            np.save(data, pixels[name])
+            write_bytes(path, data.getvalue())
+        else:
+            # A white diffuse surface that faces one of the lights is white.
+            picture.write_png(path, picture.encode(picture.expose(pixels[name], 1 / math.pi)))
+        result = {"material": name, "picture": str(path)}
+        print(json.dumps(result) if options.json else path)
+    return DONE
 
 
 def _material(options: argparse.Namespace) -> int:

@@ -152,7 +152,7 @@ def draw(
         if character != " ":
             segments, left, _ = _outline(character)
             placed = segments * [scale, -scale] + [x - left * scale, y]
-            _stroke(image, placed, max(pen, 1.0) / 2, np.asarray(color, dtype=image.dtype))
+            stroke(image, placed, max(pen, 1.0) / 2, np.asarray(color, dtype=image.dtype))
         x += _advance(character) * scale
 
 
@@ -205,7 +205,7 @@ def _flatten(points: list[str]) -> NDArray[np.float64]:
     return np.array(line if len(line) > 1 else line * 2)
 
 
-def _stroke(
+def stroke(
     image: NDArray[np.floating],
     segments: NDArray[np.float64],
     radius: float,

@@ -11,6 +11,9 @@ from lobefit.atomic import write_bytes
 
 Image = NDArray[np.float32]  # (rows, columns, 3), the first row at the top
 
+# Of pages with pictures and lettering on them.
+PAPER, INK, FAINT = (0.115, 0.115, 0.125), (0.95, 0.95, 0.95), (0.62, 0.63, 0.66)
+
 
 def expose(linear: ArrayLike, white: float) -> Image:
     """Linear light with `white` at 1; what is brighter is cut off, what is unknown black."""

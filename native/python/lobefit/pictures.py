@@ -5,17 +5,18 @@ import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobefit import _native, blender
+from lobefit import blender
 from lobefit._native import Measurement
 from lobefit.fitting import closures
 from lobefit.inputs import Progress
 from lobefit.preview import measurement_of
 from lobefit.record import Record
+from lobefit.shown import evaluate
 
 # The closures that a report compares, target and count.
 COMPARED = (("measured", 1), ("measured", 2), ("measured", 3), ("lobe", 1), ("lobe", 2))
@@ -98,17 +99,13 @@ def _errors(record: Record) -> dict[tuple[str, int | None], float | None]:
     errors[LANDMARK, None] = record.principled["error"]
     measurement = measurement_of(record)
     if measurement is not None:
-        errors["live", None] = sphere_error(
-            measurement, lambda wi, wo: _native.evaluate_live(record.parameters, wi, wo)
-        )
+        live = partial(evaluate, ("live", record.parameters))
+        errors["live", None] = sphere_error(measurement, live)
         for entry in record.closures:
             if entry["target"] == "lobe":
-                errors["lobe", entry["count"]] = sphere_error(measurement, _evaluate(entry))
+                lobe = partial(evaluate, ("closures", entry))
+                errors["lobe", entry["count"]] = sphere_error(measurement, lobe)
     return errors
-
-
-def _evaluate(entry: dict[str, Any]) -> Evaluate:
-    return lambda wi, wo: _native.evaluate_closures(entry, wi, wo)
 
 
 def _picture_error(measurement: Measurement, evaluate: Evaluate, phase: float) -> float:

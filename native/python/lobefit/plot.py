@@ -50,8 +50,9 @@ def plot(
     *,
     x_ticks: Sequence[float] = (),
     log: bool = False,
+    height: int = _HEIGHT,
 ) -> str:
-    """The lines over common axes, as an SVG element.
+    """The lines over common axes, as an SVG element `height` units high.
 
     The x axis begins and ends with `x_ticks`, and goes from 0 to a round number without them. The
     y axis is linear from 0, or logarithmic over at most `_DECADES`, below which lines are parted.
@@ -69,9 +70,9 @@ def plot(
     x_scale = _Scale(x_ticks, x_ticks[-1])
     heights = [y for _, y in known]
     y_ticks = _decades(min(heights), max(heights)) if log else _ticks(max(heights))
-    axes = _Axes(x_scale, _Scale(y_ticks, y_ticks[-1], log))
+    axes = _Axes(x_scale, _Scale(y_ticks, y_ticks[-1], log), height)
     drawn = axes.grid() + "".join(axes.curve(line, index) for index, line in enumerate(lines))
-    return framed(drawn, x_title, y_title, _WIDTH, _HEIGHT)
+    return framed(drawn, x_title, y_title, _WIDTH, height)
 
 
 def framed(drawn: str, x_title: str, y_title: str, width: int, height: int) -> str:
@@ -97,13 +98,13 @@ def legend(lines: Sequence[Line]) -> str:
 
 
 class _Axes:
-    def __init__(self, x: _Scale, y: _Scale) -> None:
-        self._x, self._y = x, y
+    def __init__(self, x: _Scale, y: _Scale, height: int) -> None:
+        self._x, self._y, self._height = x, y, height
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
         return (
             _LEFT + self._x.share(x) * (_WIDTH - _LEFT - _RIGHT),
-            _HEIGHT - _BOTTOM - self._y.share(y) * (_HEIGHT - _TOP - _BOTTOM),
+            self._height - _BOTTOM - self._y.share(y) * (self._height - _TOP - _BOTTOM),
         )
 
     def grid(self) -> str:

@@ -1,7 +1,6 @@
 """Figure 1 of Nielsen et al. for any material: measurement and fits under two lights."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +9,15 @@ from lobefit import _native, lettering, picture
 from lobefit._native import Measurement
 from lobefit.classic import as_classic
 from lobefit.origin import read_unchanged
-from lobefit.picture import Image
+from lobefit.picture import FAINT, INK, PAPER, Image
 from lobefit.record import Record
+from lobefit.shown import Shown
 
 AMPLIFIED = 4
 SPHERE = 180  # pixels a sphere, if nothing else is asked for
 THUMBNAIL = 256  # pixels of an asset's picture, as Blender shows it
-FINER = 3  # spheres are drawn this many times finer and then shrunk
+FINER = 3  # spheres of a sheet are drawn this many times finer and then shrunk
+FINER_AT_ONCE = 2  # those for which somebody waits
 TITLES = {
     "measured": "measured",
     "modified-phong": "modified Phong",
@@ -30,9 +31,6 @@ TITLES = {
 }
 FIGURES = {"relative_l1": "relative L1", "relative_l1_cosine": "cosine-weighted L1"}
 
-_PAPER = (0.115, 0.115, 0.125)
-_INK = (0.95, 0.95, 0.95)
-_FAINT = (0.62, 0.63, 0.66)
 # The radiance of the world of a thumbnail: three tenths of what a white diffuse surface that faces
 # one of the lights has.
 WORLD = 0.3 / np.pi
@@ -66,7 +64,7 @@ def row(
     measurement: Measurement | None,
     size: int = SPHERE,
     rendered: NDArray[np.float32] | None = None,
-    shown: tuple[str, dict[str, Any]] | None = None,
+    shown: Shown | None = None,
     classic: bool = False,
 ) -> Row:
     """The spheres of a record, all at the exposure that suits the first of them.
@@ -109,7 +107,27 @@ def row(
     )
 
 
-def thumbnail(shown: tuple[str, dict[str, Any]], size: int = THUMBNAIL) -> NDArray[np.float32]:
+def compared(
+    measurement: Measurement | None,
+    shown: Shown,
+    size: int = SPHERE,
+    rendered: NDArray[np.float32] | None = None,
+) -> dict[str, Image]:
+    """The spheres `measured`, `cycles` and `difference` as sRGB images, exposed alike.
+
+    `rendered` is what Cycles itself gave, FINER_AT_ONCE * size pixels wide; without it `shown` is
+    drawn. Without a measurement there is the one sphere.
+    """
+    pixels = size * FINER_AT_ONCE
+    linear = {"measured": _native.preview(measurement, pixels)} if measurement else {}
+    linear["cycles"] = _native.preview(shown, pixels) if rendered is None else rendered
+    if measurement:
+        linear["difference"] = AMPLIFIED * np.abs(linear["cycles"] - linear["measured"])
+    white = picture.white_point(next(iter(linear.values())))
+    return {name: _sphere(image, white, FINER_AT_ONCE) for name, image in linear.items()}
+
+
+def thumbnail(shown: Shown, size: int = THUMBNAIL) -> NDArray[np.float32]:
     """The sphere of an asset, sRGB with the share of the pixel it covers: (size, size, 4).
 
     `shown` is what Cycles shows, as `_native.preview` takes it. A faint white world around the two
@@ -146,11 +164,11 @@ def sheet(rows: list[Row], size: int = SPHERE) -> Image:
     image = picture.page(
         _HEADER + len(rows) * (size + _CAPTION + _GAP) + _MARGIN - _GAP,
         left + len(columns) * step - _GAP + _MARGIN,
-        _PAPER,
+        PAPER,
     )
     for index, title in enumerate(columns):
         middle = left + index * step + wide / 2
-        lettering.draw(image, TITLES[title], middle, _HEADER - 18, _TEXT, _INK, "center")
+        lettering.draw(image, TITLES[title], middle, _HEADER - 18, _TEXT, INK, "center")
     for index, (material, lines) in enumerate(zip(rows, names, strict=True)):
         top = _HEADER + index * (size + _CAPTION + _GAP)
         _letter_name(image, lines, left - _GAP, top + size / 2)
@@ -158,22 +176,22 @@ def sheet(rows: list[Row], size: int = SPHERE) -> Image:
             corner = left + columns.index(title) * step + (wide - size) // 2
             picture.paste(image, panel.image, top, corner, picture.disc(size))
             middle = corner + size / 2
-            lettering.draw(image, panel.caption, middle, top + size + 21, _SMALL, _FAINT, "center")
+            lettering.draw(image, panel.caption, middle, top + size + 21, _SMALL, FAINT, "center")
     return image
 
 
-def _sphere(linear: NDArray[np.float32], white: float) -> Image:
-    return picture.encode(picture.shrink(picture.expose(linear, white), FINER))
+def _sphere(linear: NDArray[np.float32], white: float, finer: int = FINER) -> Image:
+    return picture.encode(picture.shrink(picture.expose(linear, white), finer))
 
 
-def _nearest(record: Record) -> tuple[str, dict[str, Any]]:
+def _nearest(record: Record) -> Shown:
     measured = [entry for entry in record.closures if entry["target"] == "measured"]
     if measured:
         return "closures", min(measured, key=lambda entry: entry["error"])
     return "live", record.parameters
 
 
-def _caption(shown: tuple[str, dict[str, Any]], record: Record) -> str:
+def _caption(shown: Shown, record: Record) -> str:
     kind, what = shown
     if kind == "closures":
         many = len(what["specular"])
@@ -193,7 +211,7 @@ def _lines(name: str) -> list[str]:
 
 
 def _letter_name(image: Image, lines: list[str], right: float, middle: float) -> None:
-    for index, (line, color) in enumerate(zip(lines, (_INK, _FAINT), strict=False)):
+    for index, (line, color) in enumerate(zip(lines, (INK, FAINT), strict=False)):
         baseline = middle + 6 + (index - (len(lines) - 1) / 2) * 24
         size = _TEXT if index == 0 else _SMALL
         lettering.draw(image, line, right, baseline, size, color, "right")

@@ -53,7 +53,6 @@ _TERMS = {
 _TERMS_EXPONENT = 100.0  # of the plots of their error
 _LEAST_EXCESS = 0.01  # per cent of L1; methods that are closer to each other are equally good
 _MOST_EXCESS = 1.0  # per cent; bins drawn for the slow methods do not explain more than this
-_CHANNELS = (("red", "#c8402f"), ("green", "#3b8f3e"), ("blue", "#3166c4"))
 _ERROR_TITLES = {
     "l1": "mean |f &minus; m|",
     "relative_l1": "relative L1",
@@ -496,14 +495,9 @@ def _term_plot(lines: Sequence[Line]) -> str:
 
 
 def _albedo_plot(record: Record) -> str:
-    lines = []
-    for kind in ("measured", "model"):
-        for index, (channel, color) in enumerate(_CHANNELS):
-            values = [entry[index] for entry in record.albedo[kind]]
-            angles = record.albedo["view_angle"]
-            lines.append(Line(f"{kind}, {channel}", angles, values, color, kind == "model"))
-    drawn = plot(lines, "view angle in degrees", "albedo", x_ticks=range(0, 91, 15))
-    return drawn + legend(lines)
+    albedos = {kind: record.albedo[kind] for kind in ("measured", "model")}
+    lines = angles.albedo_lines(record.albedo["view_angle"], albedos)
+    return angles.albedo_plot(lines) + legend(lines)
 
 
 def _facts(record: Record, rendering: Rendering | None) -> str:

@@ -1,0 +1,87 @@
+"""Edits the parameters of a measured material, and takes back what was edited."""
+
+from typing import ClassVar
+
+import bpy
+
+from .. import native
+from ..nodes.material import fill_material
+from ..parameters import is_edited, reset
+from ..records import COUNT_KEY, KEY, KIND_KEY, active_material, record_of
+from ..swaps import has_bounces, problem_of
+
+
+class _EditsMaterial:
+    """What operators have in common that change the active measured material at once."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        material = active_material(context)
+        if record_of(material) is None:
+            cls.poll_message_set("The active material was not made from a measurement")
+            return False
+        reason = problem_of(material)
+        if reason:
+            cls.poll_message_set(f"The active material cannot be changed: {reason}")
+        return not reason
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        problem = native.problem()
+        if problem:
+            self.report({"ERROR"}, problem)
+            return {"CANCELLED"}
+        import lobefit
+
+        material = active_material(context)
+        try:
+            record = lobefit.Record.from_json(material[KEY], material.name)
+            self.change(material, record)
+        except (lobefit.InputError, ValueError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class LOBEFIT_OT_edit_parameters(_EditsMaterial, bpy.types.Operator):
+    """Make the active material one of the kind Live, whose parameters are all there to be edited"""
+
+    bl_idname = "lobefit.edit_parameters"
+    bl_label = "Edit as Live"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if active_material(context).get(KIND_KEY, "live") == "live":
+            cls.poll_message_set("The active material is of the kind Live: its inputs are below")
+            return False
+        return True
+
+    def change(self, material: bpy.types.Material, record: object) -> None:
+        fill_material(material, record, "live")
+
+
+class LOBEFIT_OT_reset_parameters(_EditsMaterial, bpy.types.Operator):
+    """Give the parameters of the active material the fitted values again"""
+
+    bl_idname = "lobefit.reset_parameters"
+    bl_label = "Reset"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        material = active_material(context)
+        if not is_edited(material, record_of(material), material.get(KIND_KEY, "live")):
+            cls.poll_message_set("Nothing was edited")
+            return False
+        return True
+
+    def change(self, material: bpy.types.Material, record: object) -> None:
+        kind = material.get(KIND_KEY, "live")
+        if not reset(material, record_of(material), kind):
+            # Its nodes are no longer those of the record.
+            count = material.get(COUNT_KEY) if kind in ("lobe", "measured") else None
+            fill_material(material, record, kind, count, diffuse_bounces=has_bounces(material))
