@@ -438,5 +438,7 @@ def test_render_shows_each_measured_material(tmp_path, blend, fitted, capfd):
         # The facets of the mesh move a highlight by a small part of a pixel; see test_two_lights.
         assert np.abs(rendered - formula).sum() < 0.03 * formula.sum()
     assert main([*arguments, str(tmp_path / "png")]) == 0
-    assert sorted(os.listdir(tmp_path / "png")) == ["a_b-2.png", "a_b.png"]
+    pictures = [str(tmp_path / "png" / f"{stem}.png") for stem in ("a_b", "a_b-2")]
+    assert capfd.readouterr().out.splitlines() == pictures
+    assert all(Path(path).read_bytes().startswith(b"\x89PNG") for path in pictures)
     assert "no such file" in refuse(capfd, "render", tmp_path / "gone.blend", "-o", tmp_path)
