@@ -42,15 +42,16 @@ def _is_hidden_here(context: bpy.types.Context, item: bpy.types.Object) -> bool:
 
 
 def _slot_of_face(item: bpy.types.Object, face: int, depsgraph: bpy.types.Depsgraph) -> int:
-    if item.mode == "EDIT" and item.type == "MESH":
+    if item.mode == "EDIT" and item.type == "MESH" and bpy.app.version >= (4, 3):
         # The ray then meets the faces that are edited, not those that modifiers make of them.
         faces = bmesh.from_edit_mesh(item.data).faces
         faces.ensure_lookup_table()
         index = faces[face].material_index
     else:
         evaluated = item.evaluated_get(depsgraph)
-        # A mesh is at hand; other surfaces are converted.
-        mesh = evaluated.data if item.type == "MESH" else evaluated.to_mesh()
+        # A mesh is at hand unless it is edited; other surfaces are converted.
+        at_hand = item.type == "MESH" and item.mode != "EDIT"
+        mesh = evaluated.data if at_hand else evaluated.to_mesh()
         index = mesh.polygons[face].material_index
         evaluated.to_mesh_clear()
     return max(0, min(index, len(item.material_slots) - 1))

@@ -98,7 +98,9 @@ def test_the_slot_of_the_face_under_the_cursor(from_above):
 
 def test_surfaces_that_are_no_meshes(from_above):
     ball = add(bpy.ops.surface.primitive_nurbs_surface_sphere_add, slots=1)
-    assert from_above(0.1, 0.1) == (ball, 0)
+    # Blender 4.2 sends its rays at meshes and metaballs alone.
+    found = (ball, 0) if bpy.app.version >= (4, 3) else None
+    assert from_above(0.1, 0.1) == found
 
 
 def test_an_instance_stands_for_its_object(from_above):
@@ -112,7 +114,7 @@ def test_an_instance_stands_for_its_object(from_above):
 
 def test_what_the_viewport_does_not_show_is_seen_through(from_above):
     add(location=(0, 0, 3))
-    ball = add(bpy.ops.surface.primitive_nurbs_surface_sphere_add)
+    ball = add(bpy.ops.object.metaball_add, type="BALL")
     editor("VIEW_3D").spaces.active.show_object_viewport_mesh = False
     assert from_above(0.1, 0.1) == (ball, 0)
 
