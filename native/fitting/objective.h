@@ -56,7 +56,7 @@ class Objective {
   // A solver comes back to the point it stands at after a step that led nowhere.
   struct Answer {
     Eigen::VectorXd x;
-    Curvature curvature;
+    Curvature curvature{};
     Evaluation evaluation;
   };
   mutable std::array<Answer, 2> answers_;  // the latest first

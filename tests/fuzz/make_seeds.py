@@ -46,6 +46,15 @@ _MERL_WORDS += [seed[-4:] for seed in _MERL.values()]
 _MERL_WORDS += [struct.pack("<d", number) for number in (np.nan, np.inf, -1.0, 1e308)]
 
 
+_LIGHTS = {
+    "plain": b'{"schema":1,"pictures":[{"lights":[{"direction":[0,0,1],"irradiance":3}]}]}',
+    "whole": b"""{"schema": 1, "pictures": [
+ {"image": "left.png", "lights": [{"direction": [-1, 0.5, 1.2], "irradiance": [3.1, 3, 2.8]}],
+  "ambient": 0.02, "exposure": 1},
+ {"image": "right.png", "lights": [{"direction": [1, 0, 1], "irradiance": 2}],
+  "ambient": [0, 0, 1]}]}
+""",
+}
 _RECORD = {"plain": plain_record().to_json().encode(), "whole": whole_record()}
 
 
@@ -56,12 +65,14 @@ def _write_words(path: Path, words: list[bytes]) -> None:
 
 def make_seeds(folder: Path) -> None:
     """Writes the seeds and the words of every target."""
-    for name in ("fuzz_rgl", "fuzz_merl", "fuzz_record"):
+    for name in ("fuzz_rgl", "fuzz_merl", "fuzz_record", "fuzz_lights"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for name, fields in _RGL.items():
         write_tensor_file(folder / "fuzz_rgl" / name, fields)
     for name, seed in _MERL.items():
         (folder / "fuzz_merl" / name).write_bytes(seed)
+    for name, seed in _LIGHTS.items():
+        (folder / "fuzz_lights" / name).write_bytes(seed)
     for name, seed in _RECORD.items():
         (folder / "fuzz_record" / name).write_bytes(seed)
     _write_words(folder / "fuzz_rgl.dict", _RGL_WORDS)

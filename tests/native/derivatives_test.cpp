@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -75,6 +76,9 @@ struct Point {
   ModelKind kind = ModelKind::interpolated;
   std::function<void(VectorXd&)> move;  // from a point inside
 };
+
+// GoogleTest would print the bytes, those between the members too, which nobody has written.
+void PrintTo(const Point& point, std::ostream* out) { *out << point.name; }
 
 VectorXd variables_at(const Point& point) {
   const bool interpolated = point.kind == ModelKind::interpolated;
