@@ -109,7 +109,9 @@ def judged(process: subprocess.Popen, out: Path, old: dict[str, bytes]) -> str:
     if process.returncode == 0 and not told:
         return DONE
     last = told[-1][:200] if told else "nothing"
-    sentences = all(line.startswith("lobefit: ") and line.endswith((".", "?")) for line in told)
+    sentences = "Traceback" not in last and all(
+        line.startswith("lobefit: ") and line.endswith((".", "?")) for line in told
+    )
     if process.returncode in (1, 2) and told and sentences and len(set(told)) == len(told):
         return REFUSED
     return f"exit code {process.returncode}, saying {last}"
@@ -428,13 +430,13 @@ def closed_blender(inputs: Inputs, folder: Path, _: int) -> Tries:
 import sys, time
 import bpy, lobefit, lobefit_addon
 from lobefit_addon import child
-lobefit_addon.register()
 place, table, tables, way = sys.argv[1:]
 work = [lobefit.start_fit(table) for _ in range(4)]
 work.append(child.Child(["library", tables, "-o", place, "--json", "--kind", "principled"]))
 print("started", flush=True)
 time.sleep(float(way.partition(" ")[2] or 0))
 if way.startswith("quit"):
+    lobefit_addon.register()
     lobefit_addon.unregister()
     bpy.ops.wm.quit_blender()
 elif way.startswith("exit"):

@@ -4,14 +4,15 @@ The benchmark `faults` tries more of it, and for longer.
 """
 
 import os
+import resource
 import subprocess
 import sys
 import threading
 from pathlib import Path
 
 import pytest
-from commands import PATIENCE, refuse
-from lobefit import InputError, Record, atomic, catalogues, fit, start_fit
+from commands import PATIENCE, refuse, start
+from lobefit import InputError, Record, atomic, blender, catalogues, fit, start_fit
 from lobefit.catalogues import Catalogues
 from lobefit.command_line import main
 from lobefit.origin import read_unchanged
@@ -147,6 +148,27 @@ sys.exit(main(sys.argv[1:]))
     assert ended.stderr.startswith("lobefit: ") and ended.stderr.count("\n") == 1
     assert ended.stderr.endswith("expected enough memory, found too little.\n")
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("kind", ["gltf", "usd"])
+def test_exports_to_a_full_disk_get_one_sentence(tmp_path, table, kind):
+    scene = tmp_path / "scene.blend"
+    blender.write_blend(scene, fit(table))
+    out = tmp_path / "out"
+    # A sphere takes more than this, and so no exporter comes to its end.
+    limit = (20_000,) * 2
+    process = start(
+        "export",
+        scene,
+        f"--{kind}",
+        "-o",
+        out,
+        before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit),
+    )
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert err.startswith(f"lobefit: {out}") and err.count("\n") == 1 and "Traceback" not in err
+    assert os.listdir(out) == []
 
 
 def test_files_of_strangers_run_nothing(tmp_path, capfd):

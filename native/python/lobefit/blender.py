@@ -316,6 +316,10 @@ def _open(path: str | os.PathLike[str]) -> None:
 
 
 def _one_line(error: RuntimeError) -> str:
+    text = str(error)
+    if "Traceback" in text:  # of an exporter in Python, followed by the place of the call
+        lines = [line for line in text.splitlines() if line and not line.startswith("Location:")]
+        return lines[-1].rstrip(".")
     return " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
 
 
