@@ -34,7 +34,10 @@ ReflectanceMap::ReflectanceMap(const Reflectance& f_times_cosine,
   parallel_for(nodes, threads, [&](int row) {
     monitor.throw_if_cancelled();
     for (int column = 0; column < nodes; ++column) {
-      const SeenPoint point(normal_at(facing(place_of_node(row, column))));
+      const Place place = place_of_node(row, column);
+      // The cubics of places within the rim do not reach farther.
+      if (place.norm() > 1 + 2 * beside * (2.0 / steps)) continue;
+      const SeenPoint point(normal_at(facing(place)));
       float* values = table_.data() + first_of_node(row, column);
       for (const Lighting& each : lighting) {
         for (const double channel : shading.value(point, each)) {

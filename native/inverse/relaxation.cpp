@@ -21,7 +21,7 @@ constexpr int least_side = 24;
 constexpr int sweeps = 60;
 // What a difference of 1 between a normal and its neighbours weighs against a difference of
 // brightness of a factor e.
-constexpr double smoothness = 3;
+constexpr double smoothness = 10;
 // What a difference of 1 to the normal of the mask blown up weighs along the silhouette.
 constexpr double silhouette_weight = 10;
 
@@ -106,7 +106,7 @@ std::vector<Place> inflated_places(const Grid& grid) {
   return places;
 }
 
-// A level after all that are coarser, which take a quarter of its time; progress ends at `share`.
+// A level after all that are coarser, which take a quarter of the time; progress ends at `share`.
 std::vector<Place> relaxed(const ReflectanceMap& map, const Level& level, int threads, double share,
                            Monitor& monitor) {
   std::vector<Place> start;
