@@ -8,6 +8,7 @@ import bpy
 
 from . import native, pictures
 from .layouts import draw_paragraph, draw_problem, draw_progress
+from .locks import lock_of
 from .nodes.material import Choice, shown_by
 from .nodes.principled import SOCKETS
 from .operators.fit import LOBEFIT_OT_fit
@@ -112,17 +113,17 @@ def _problem_of_record(material: bpy.types.Material) -> str:
 
 def _draw_origin(layout: Any, context: bpy.types.Context, material: bpy.types.Material) -> None:
     """What keeps the material from being changed, and whether it is of an older version."""
-    linked = material.library is not None
+    reason, linked = lock_of(material), material.library is not None
     if linked:
         sentence = f"Linked from {Path(material.library.filepath).name}: change it there."
         draw_paragraph(layout, sentence, "LINKED", context)
-    elif material.override_library is not None:
-        draw_paragraph(layout, "A library override: its nodes are linked.", "LINKED", context)
+    elif reason:
+        draw_paragraph(layout, f"It cannot be changed: {reason}.", "LINKED", context)
     if is_outdated(material):
         where = "; update it there" if linked else ""
         sentence = f"Made by an older version of Lobefit{where}. It renders as it did."
         draw_paragraph(layout, sentence, "FILE_REFRESH", context)
-        if not linked:
+        if not reason:
             layout.operator(LOBEFIT_OT_update_materials.bl_idname, text="Update")
 
 

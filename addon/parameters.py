@@ -3,11 +3,11 @@
 Nothing in here needs the compiled module: panels draw it.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import bpy
-import numpy as np
 
 from .nodes.baked import is_baked
 from .nodes.live import VERSION_KEY as LIVE_KEY
@@ -120,9 +120,16 @@ _TOLD = {"live": _live, "principled": _principled, "closures": _baked}
 
 def _differs(node: bpy.types.Node, recorded: Mapping[str, Any]) -> bool:
     return any(
-        socket.is_linked or not np.allclose(_plain(socket), value, rtol=_EQUAL, atol=1e-9)
+        socket.is_linked or not _are_equal(_plain(socket), value)
         for socket, value in _sockets(node, recorded)
     )
+
+
+def _are_equal(value: Any, recorded: Any) -> bool:
+    if isinstance(value, list) != isinstance(recorded, list):
+        return False
+    pairs = zip(value, recorded, strict=True) if isinstance(value, list) else [(value, recorded)]
+    return all(math.isclose(*pair, rel_tol=_EQUAL, abs_tol=1e-9) for pair in pairs)
 
 
 def _sockets(

@@ -4,13 +4,15 @@ They are there as long as Blender runs, and nothing of them is saved.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import bpy.utils.previews
-import numpy as np
 
 from .records import COUNT_KEY, KEY, KIND_KEY
+
+if TYPE_CHECKING:  # NumPy is loaded when it is used: Blender starts as soon as before.
+    import numpy as np
 
 IMAGE = "Lobefit Preview"
 
@@ -25,7 +27,7 @@ class Drawn:
     A fourth channel is the share of each pixel that is covered.
     """
 
-    pictures: dict[str, np.ndarray]
+    pictures: "dict[str, np.ndarray]"
     stamp: int
     caption: str = ""
 
@@ -33,7 +35,7 @@ class Drawn:
 def keep(
     material: bpy.types.Material,
     place: str,
-    pictures: dict[str, np.ndarray],
+    pictures: "dict[str, np.ndarray]",
     caption: str = "",
 ) -> None:
     """Takes pictures by their titles in the place of older ones.
@@ -60,6 +62,8 @@ def icon_id(material: bpy.types.Material, place: str, title: str) -> int:
 
 def as_image(drawn: Drawn) -> bpy.types.Image:
     """The pictures side by side as an image of the file, which takes the place of an older one."""
+    import numpy as np
+
     pixels = _for_blender(np.concatenate(list(drawn.pictures.values()), axis=1))
     rows, columns = pixels.shape[:2]
     image = bpy.data.images.get(IMAGE) or bpy.data.images.new(IMAGE, columns, rows)
@@ -94,8 +98,10 @@ def unregister() -> None:
     _kept.clear()
 
 
-def _for_blender(picture: np.ndarray) -> np.ndarray:
+def _for_blender(picture: "np.ndarray") -> "np.ndarray":
     """The picture with its rows from below, as Blender wants it, and how opaque each pixel is."""
+    import numpy as np
+
     pixels = np.ones((*picture.shape[:2], 4), np.float32)
     pixels[..., : picture.shape[2]] = picture[::-1]
     return pixels

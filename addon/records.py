@@ -104,6 +104,11 @@ def _parsed(text: str) -> dict[str, Any] | None:
     return entries if isinstance(entries, dict) else None
 
 
+def has_bounces(material: bpy.types.Material) -> bool:
+    """Whether light that bounced off a diffuse surface meets a diffuse closure only."""
+    return bool(material.get(BOUNCES_KEY, False))
+
+
 def is_simplified(material: bpy.types.Material) -> bool:
     """Whether the material can be shown again as before it was simplified."""
     return BEFORE_KEY in material and KEY in material

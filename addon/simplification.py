@@ -13,19 +13,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .records import KEY, RESULT_KEY, is_simplified
+from .locks import problem_of
+from .records import KEY, RESULT_KEY, has_bounces, is_simplified
 from .scene import render_seconds
 from .scene_budget import BOUNCE_TOLERANCE, Decision, Subject, choose_ways
 from .scene_view import lights, shown_only_in_renders
 from .survey import Survey
-from .swaps import (
-    has_bounces,
-    is_as_built,
-    is_named,
-    problem_of,
-    restore,
-    show,
-)
+from .swaps import is_as_built, is_named, restore, show
 from .ways import Way, albedo_of, ways_of
 
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import bpy
 
+from .locks import problem_of
 from .records import KEY
 from .scene_view import View, evenly, look, problem_of_camera
-from .swaps import problem_of
 
 
 class Survey:

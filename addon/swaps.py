@@ -4,31 +4,14 @@ from typing import Any
 
 import bpy
 
-from .locks import lock_of
 from .nodes.material import BAKED, build_material, discard, fill_material
-from .records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KIND_KEY, is_simplified
+from .records import BEFORE_KEY, COUNT_KEY, KIND_KEY, has_bounces, is_simplified
 from .ways import Way
 
 _COMPARED = ".lobefit as built"  # a material that is there only to be compared with
 # Curve mappings, groups and active outputs are looked at elsewhere, or by choice not at all.
 _NOT_SETTINGS = {*bpy.types.Node.bl_rna.properties.keys(), "is_active_output"}
 _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
-
-
-def problem_of(material: bpy.types.Material) -> str:
-    """Why a material has to be left as it is; empty for one that may be changed."""
-    if lock_of(material):
-        return lock_of(material)
-    if material.node_tree is None:
-        return "it has no nodes"
-    if material.node_tree.animation_data is not None:
-        return "its nodes are animated"
-    return ""
-
-
-def has_bounces(material: bpy.types.Material) -> bool:
-    """Whether light that bounced off a diffuse surface meets a diffuse closure only."""
-    return bool(material.get(BOUNCES_KEY, False))
 
 
 def is_named(material: bpy.types.Material, way: Way) -> bool:

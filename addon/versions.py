@@ -10,8 +10,7 @@ from .nodes.live import VERSION_KEY as LIVE_KEY
 from .nodes.live import live_group
 from .nodes.material import BAKED, fill_material, shown_by
 from .parameters import parameter_nodes
-from .records import KIND_KEY, SCHEMA, VERSION, VERSION_KEY, entries_of, record_of
-from .swaps import has_bounces
+from .records import KIND_KEY, SCHEMA, VERSION, VERSION_KEY, entries_of, has_bounces, record_of
 
 
 def is_outdated(material: bpy.types.Material) -> bool:

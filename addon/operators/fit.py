@@ -12,6 +12,7 @@ from ..locks import lock_of
 from ..nodes.material import fill_material
 from ..records import active_material, record_of, source_file
 from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB
+from .polls import poll_changeable, poll_measured
 from .preview import draw_spheres
 from .run import RunsFits, current
 
@@ -35,15 +36,12 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        material = active_material(context)
-        if record_of(material) is None:
-            cls.poll_message_set("The active material was not made from a measurement")
-            return False
-        reason = lock_of(material)
-        if reason:
-            cls.poll_message_set(f"The active material cannot be fitted anew: {reason}")
-            return False
-        return super().poll(context)
+        # All nodes are made anew: it is no matter what they were, or whether there were any.
+        return (
+            poll_measured(cls, context)
+            and poll_changeable(cls, [active_material(context)], lock_of)
+            and super().poll(context)
+        )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Asks for the measured file where it is not found."""

@@ -7,12 +7,13 @@ from bpy.props import EnumProperty
 
 from .. import native
 from ..jobs import Batch
+from ..locks import problem_of
 from ..nodes.material import fill_material, shown_by
 from ..parameters import is_edited
 from ..preferred import take_preferred
 from ..properties import KINDS, KindOptions, draw_kind_options
 from ..records import KEY, active_material, located, record_of
-from ..swaps import problem_of
+from .polls import poll_changeable
 from .run import RunsWork
 
 _SCOPES = (
@@ -34,10 +35,11 @@ class LOBEFIT_OT_set_kind(KindOptions, RunsWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _measured(_materials(context, "ACTIVE") + _materials(context, "SELECTED")):
+        found = _measured(_materials(context, "ACTIVE") + _materials(context, "SELECTED"))
+        if not found:
             cls.poll_message_set("Neither the active material nor a selected object is measured")
             return False
-        return super().poll(context)
+        return poll_changeable(cls, found) and super().poll(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context)

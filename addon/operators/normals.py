@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
 from .. import native
-from ..images import linear_light, new_data_image
 from ..nodes.material import shown_by
 from ..records import KEY, active_material, record_of
 from .run import RunsWork
@@ -120,7 +118,10 @@ node, and heights for displacement. The file of lights says which images belong 
     def conclude(self, context: bpy.types.Context, work: Estimate) -> set[str]:
         if work.problem:
             return self.refuse(work.problem)
+        import numpy as np
         from lobefit import normals
+
+        from ..images import new_data_image
 
         name = self._first
         found = new_data_image(f"{name} Normals", normals.as_normal_map(work.surface.normals))
@@ -154,6 +155,8 @@ node, and heights for displacement. The file of lights says which images belong 
     def _job(self) -> Any:
         """The estimate, started. Raises InputError for what it cannot be started with."""
         from lobefit import lights, normals
+
+        from ..images import linear_light
 
         path = bpy.path.abspath(self.filepath)
         lighting = lights.read_lights(path)

@@ -7,8 +7,8 @@ import bpy
 from .. import native
 from ..nodes.material import fill_material
 from ..parameters import is_edited, reset
-from ..records import COUNT_KEY, KEY, KIND_KEY, active_material, record_of
-from ..swaps import has_bounces, problem_of
+from ..records import COUNT_KEY, KEY, KIND_KEY, active_material, has_bounces, record_of
+from .polls import poll_changeable, poll_measured
 
 
 class _EditsMaterial:
@@ -16,14 +16,7 @@ class _EditsMaterial:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        material = active_material(context)
-        if record_of(material) is None:
-            cls.poll_message_set("The active material was not made from a measurement")
-            return False
-        reason = problem_of(material)
-        if reason:
-            cls.poll_message_set(f"The active material cannot be changed: {reason}")
-        return not reason
+        return poll_measured(cls, context) and poll_changeable(cls, [active_material(context)])
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         problem = native.problem()

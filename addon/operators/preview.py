@@ -10,6 +10,7 @@ from .. import native, pictures
 from ..nodes.material import shown_by
 from ..parameters import edited_shown, is_edited
 from ..records import KEY, active_material, located, record_of
+from .polls import poll_measured
 from .run import RunsWork
 
 # NumPy, and what starts processes, are loaded when they are used: Blender starts as soon as before.
@@ -32,14 +33,6 @@ CHART_KINDS = (
 )
 
 _SIZE = 192  # pixels a sphere
-
-
-def poll_measured(cls: type, context: bpy.types.Context) -> bool:
-    """Whether the active material has a record; says so where a button is greyed out."""
-    found = record_of(active_material(context)) is not None
-    if not found:
-        cls.poll_message_set("The active material was not made from a measurement")
-    return found
 
 
 def draw_spheres(

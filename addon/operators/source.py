@@ -10,10 +10,11 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from .. import native
+from ..locks import lock_of
 from ..preferred import measured_folders
 from ..records import KEY, active_material, record_of, source_file
 from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB
-from .preview import poll_measured
+from .polls import poll_changeable, poll_measured
 
 _MOST_FILES = 20000  # that are looked at below a folder
 
@@ -42,12 +43,8 @@ class LOBEFIT_OT_relink(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not poll_measured(cls, context):
-            return False
-        if active_material(context).library is not None:
-            cls.poll_message_set("The active material is linked from another file")
-            return False
-        return True
+        material = active_material(context)
+        return poll_measured(cls, context) and poll_changeable(cls, [material], lock_of)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Asks for the file, where it is not in the folder that the preferences tell."""
@@ -93,10 +90,10 @@ class LOBEFIT_OT_relink(bpy.types.Operator):
 
 
 def _link_others(material: bpy.types.Material, folder: Path) -> list[bpy.types.Material]:
-    """Tells the other local materials whose files are not found where theirs are now."""
+    """Tells the other materials whose files are not found where theirs are now."""
     linked = []
     for other in bpy.data.materials:
-        record = None if other == material or other.library is not None else record_of(other)
+        record = None if other == material or lock_of(other) else record_of(other)
         if record is not None and not source_file(record["source"]):
             path = _find(folder, record["source"])
             if path:

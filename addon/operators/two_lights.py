@@ -1,10 +1,10 @@
 """The scene of the pictures, for the artist to open: their material beside the measurement."""
 
+import math
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 from mathutils import Matrix, Vector
 
@@ -13,12 +13,15 @@ from ..nodes.tree import empty_shader_tree
 from ..records import active_material, record_of
 from .preview import measured
 
+if TYPE_CHECKING:  # NumPy is loaded when it is used: Blender starts as soon as before.
+    import numpy as np
+
 BLEND = Path(__file__).parents[1] / "blend_files" / "two_lights.blend"
 _SCENE = "Two Lights"
 _MEASURED_SIZE = 1024  # pixels of the sphere that is drawn beside
 _APART = 1.05  # half of the way between the two spheres, of radius 1
 # What is up for an artist (z) is up in the picture (y), and their front is toward the camera.
-_UPRIGHT = Matrix.Rotation(-np.pi / 2, 4, "X")
+_UPRIGHT = Matrix.Rotation(-math.pi / 2, 4, "X")
 
 _SUBJECTS = (
     ("SPHERE", "Sphere", "A sphere of the active material"),
@@ -84,7 +87,7 @@ the previews, beside the measurement"""
                 bpy.ops.render.render("INVOKE_DEFAULT", scene=scene.name)
         return {"FINISHED"}
 
-    def _reference(self, material: bpy.types.Material) -> np.ndarray | None:
+    def _reference(self, material: bpy.types.Material) -> "np.ndarray | None":
         """The light of the measured sphere (rows from the top), or None with a warning."""
         if record_of(material) is None:
             self.report({"WARNING"}, f"{material.name} was not made from a measurement")
@@ -144,7 +147,7 @@ def _fitted_copy(item: bpy.types.Object, depsgraph: Any) -> bpy.types.Object:
 
 
 def _put_beside(
-    scene: bpy.types.Scene, shown: bpy.types.Object, reference: np.ndarray, name: str
+    scene: bpy.types.Scene, shown: bpy.types.Object, reference: "np.ndarray", name: str
 ) -> None:
     """Makes room in the picture for the measured sphere, to the left of what is shown."""
     shown.matrix_world = Matrix.Translation((_APART, 0, 0)) @ shown.matrix_world
@@ -163,7 +166,9 @@ def _put_beside(
     scene.render.resolution_x = 2 * scene.render.resolution_y
 
 
-def _image(name: str, light: np.ndarray) -> bpy.types.Image:
+def _image(name: str, light: "np.ndarray") -> bpy.types.Image:
+    import numpy as np
+
     size = len(light)
     place = (np.arange(size) + 0.5) * 2 / size - 1
     pixels = np.empty((size, size, 4), np.float32)

@@ -5,9 +5,10 @@ from typing import ClassVar
 import bpy
 
 from .. import native
+from ..locks import problem_of
 from ..records import KEY
-from ..swaps import problem_of
 from ..versions import is_outdated, update
+from .polls import poll_changeable
 
 
 class LOBEFIT_OT_update_materials(bpy.types.Operator):
@@ -20,10 +21,11 @@ what is linked from other files is named and left as it is"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        found = any(map(is_outdated, bpy.data.materials))
+        found = list(filter(is_outdated, bpy.data.materials))
         if not found:
             cls.poll_message_set("No material of the file was made by an older Lobefit")
-        return found
+            return False
+        return poll_changeable(cls, found)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         problem = native.problem()

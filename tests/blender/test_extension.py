@@ -1,6 +1,9 @@
 """The extension as a whole: its coming and going, its panel, a module that is missing."""
 
+import shutil
+import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -17,6 +20,7 @@ OPERATORS = [
     "draw_chart",
     "edit_parameters",
     "export_measured",
+    "find_normals",
     "fit",
     "import_measured",
     "make_classic",
@@ -34,6 +38,28 @@ OPERATORS = [
     "two_lights",
     "update_materials",
 ]
+
+# What costs too much to be loaded as Blender starts. Some of it `bpy` has loaded already, or other
+# add-ons have, so it is forgotten first.
+HEAVY = ["numpy", "lobefit", "tempfile", "subprocess", "tomllib", "hashlib", "multiprocessing"]
+START = """
+import sys
+import bpy
+
+class Refusing:
+    def find_spec(self, name, path, target=None):
+        if name.partition(".")[0] in sys.argv[2:]:
+            raise AssertionError(f"{name} was loaded")
+
+for name in [name for name in sys.modules if name.partition(".")[0] in sys.argv[2:]]:
+    del sys.modules[name]
+sys.meta_path.insert(0, Refusing())
+sys.path.insert(0, sys.argv[1])
+import started_addon
+started_addon.register()
+print("registered")
+started_addon.unregister()
+"""
 
 
 @pytest.fixture
@@ -94,6 +120,13 @@ def test_enabling_again_leaves_nothing(addon):
         assert ours(addon) == {name: [] for name in before} | {"keys": before["keys"]}
         bpy.ops.preferences.addon_enable(module=addon.__name__)
     assert ours(addon) == before
+
+
+def test_registering_loads_nothing_heavy(addon, tmp_path):
+    shutil.copytree(Path(addon.__file__).parent, tmp_path / "started_addon")
+    command = [sys.executable, "-c", START, str(tmp_path), *HEAVY]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "registered" in answer.stdout.splitlines(), answer.stderr
 
 
 def test_unregister_ends_a_fit(addon, measured_file):

@@ -389,6 +389,13 @@ def test_a_linked_material_is_left_alone(library, shader_editor, measured_file):
 def test_an_overridden_material_is_left_alone(library, shader_editor):
     material = load(library, "materials", "nickel").override_create(remap_local_usages=True)
     assert fit_is_refused(material, "library override")
+    with bpy.context.temp_override(material=material):
+        for operator in ("set_kind", "edit_parameters", "reset_parameters", "relink"):
+            with pytest.raises(RuntimeError, match="library override"):
+                getattr(bpy.ops.lobefit, operator)()
+    del material["lobefit_version"]
+    with pytest.raises(RuntimeError, match="library override"):
+        bpy.ops.lobefit.update_materials()
     with overriding(shader_editor(material)):
         assert not bpy.ops.lobefit.add_live.poll()
 

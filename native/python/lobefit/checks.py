@@ -5,12 +5,31 @@ A check takes a value and where it stands, and raises Mismatch.
 
 import json
 import math
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from lobefit._native import InputError
+from lobefit.atomic import reason
 
 Check = Callable[[Any, str], None]
+
+
+def bytes_of(path: str | os.PathLike[str], what: str, most: int = -1) -> bytes:
+    """What the file `path` holds, up to `most` bytes and one more; `what` it should hold.
+
+    Raises InputError where it cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(most + 1 if most >= 0 else -1)
+    except IsADirectoryError:
+        raise InputError(f"{path}: expected {what}, found a folder.") from None
+    except FileNotFoundError:
+        raise InputError(f"{path}: expected {what}, found no such file.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
 
 
 def checked_json(text: str | bytes, name: str, what: str, check: Check) -> Any:

@@ -266,7 +266,7 @@ def fit(
     `progress` is called with the share done (0 to 1) and the stage some twenty times a second. An
     exception out of it, or Ctrl-C, ends the fit.
     """
-    return _wait_for(start_fit(source, **options), progress)
+    return wait_for(start_fit(source, **options), progress).record()
 
 
 def closures(
@@ -286,18 +286,22 @@ def closures(
     record is no longer there.
     """
     request = Closures(target, count, tolerance, cap_albedo)
-    return _wait_for(Job(source, closures=[request], **options), progress)
+    return wait_for(Job(source, closures=[request], **options), progress).record()
 
 
-def _wait_for(job: Job, progress: Callable[[float, str], None] | None) -> Record:
+def wait_for(job: Any, progress: Callable[[float, str], None] | None = None) -> Any:
+    """Waits for the end of a job and returns it; an exception on the way cancels the job.
+
+    `progress` is called with the share done (0 to 1) and the stage some twenty times a second.
+    """
     try:
         while not job.wait(_POLL):
             if progress:
                 progress(job.progress, job.stage)
-        return job.record()
     except BaseException:
         job.cancel()
         raise
+    return job
 
 
 def _rounded(value: Any) -> Any:

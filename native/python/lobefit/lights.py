@@ -24,14 +24,13 @@ images are given.
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from lobefit._native import InputError
-from lobefit.atomic import reason
 from lobefit.checks import (
     Mismatch,
     Missing,
+    bytes_of,
     checked_json,
     is_number,
     kind,
@@ -72,16 +71,7 @@ class Lighting:
 
 def read_lights(path: str | os.PathLike[str]) -> list[Lighting]:
     """The lighting of each picture in the file `path`. Raises InputError for anything else."""
-    try:
-        with Path(path).open("rb") as file:
-            text = file.read(_MOST_BYTES + 1)
-    except IsADirectoryError:
-        raise InputError(f"{path}: expected a file of lights, found a folder.") from None
-    except FileNotFoundError:
-        raise InputError(f"{path}: expected a file of lights, found no such file.") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
-    return lights_from_json(text, str(path))
+    return lights_from_json(bytes_of(path, "a file of lights", _MOST_BYTES), str(path))
 
 
 def lights_from_json(text: str | bytes, name: str = "lights") -> list[Lighting]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lobefit import _native
 from lobefit._native import InputError
+from lobefit.fitting import wait_for
 from lobefit.images import Image, read_image
 from lobefit.inputs import Progress
 from lobefit.lights import Lighting
@@ -19,7 +20,6 @@ from lobefit.record import Record
 # What a record may be taken for: the fitted model, or what Cycles renders of a kind of material.
 KINDS = ("model", "measured", "lobe", "live", "principled")
 
-_POLL = 0.05  # seconds between two looks at a job that is waited for
 # The part of the brightest pixels' light that is dark where no noise tells more.
 _DARK = 1e-3
 
@@ -151,15 +151,7 @@ def normals(
     **options: Any,
 ) -> Surface:
     """The surface that explains the pictures; the arguments are those of `Job`."""
-    job = Job(pictures, lighting, source, **options)
-    try:
-        while not job.wait(_POLL):
-            if progress:
-                progress(job.progress, job.stage)
-        return job.surface()
-    except BaseException:
-        job.cancel()
-        raise
+    return wait_for(Job(pictures, lighting, source, **options), progress).surface()
 
 
 def reflectance_of(record: Record, kind: str = "model") -> Any:

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from lobefit import _native
-from lobefit._native import InputError
-from lobefit.atomic import reason, write_bytes
+from lobefit.atomic import write_bytes
 from lobefit.checks import (
     Check,
     Mismatch,
     Missing,
+    bytes_of,
     checked_json,
     choice,
     kind,
@@ -172,15 +172,7 @@ class Record(Fit):
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Record":
         """The record in the file `path`. Raises InputError where it cannot be read."""
-        try:
-            text = Path(path).read_bytes()
-        except IsADirectoryError:
-            raise InputError(f"{path}: expected a record, found a folder.") from None
-        except FileNotFoundError:
-            raise InputError(f"{path}: expected a record, found no such file.") from None
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read, {reason(error)}.") from error
-        return cls.from_json(text, str(path))
+        return cls.from_json(bytes_of(path, "a record"), str(path))
 
 
 def this_machine() -> dict[str, Any]:
