@@ -71,17 +71,35 @@ std::optional<CompressedCost::Block> CompressedCost::compress(const double* free
   return block;
 }
 
+CompressedCost::Block CompressedCost::compress(const double* free_values) const {
+  const Eigen::Map<const VectorXd> point(free_values, static_cast<Eigen::Index>(free_.size()));
+  const bool known = point_.size() == point.size() && point_ == point;
+  if (!known) {
+    point_ = point;
+    curvature_ = waiting_ > 0 ? Curvature::reweighted : Curvature::newton;
+    waiting_ = std::max(0, waiting_ - 1);
+  }
+  if (curvature_ == Curvature::newton) {
+    if (const auto block = compress(free_values, Curvature::newton)) {
+      pause_ = 0;
+      return *block;
+    }
+    curvature_ = Curvature::reweighted;
+    waiting_ = pause_ = std::clamp(2 * pause_, 1, 8);
+  }
+  return *compress(free_values, Curvature::reweighted);
+}
+
 bool CompressedCost::Evaluate(double const* const* parameters, double* residuals,
                               double** jacobians) const {
   if (monitor_.cancelled()) return false;
   const auto n = static_cast<Eigen::Index>(free_.size());
   // Ceres asks for value and derivatives of one point in two calls; the objective remembers it.
-  std::optional<Block> block = compress(parameters[0], Curvature::newton);
-  if (!block) block = compress(parameters[0], Curvature::reweighted);
-  Eigen::Map<VectorXd>(residuals, n + 1) = block->residuals;
+  const Block block = compress(parameters[0]);
+  Eigen::Map<VectorXd>(residuals, n + 1) = block.residuals;
   if (jacobians != nullptr && jacobians[0] != nullptr) {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Eigen::Map<RowMajor>(jacobians[0], n + 1, n) = block->jacobian;
+    Eigen::Map<RowMajor>(jacobians[0], n + 1, n) = block.jacobian;
     if (!left_bounds(parameters[0])) x_(free_) = Eigen::Map<const VectorXd>(parameters[0], n);
   }
   return true;

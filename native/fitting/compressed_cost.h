@@ -23,7 +23,8 @@ namespace lobefit {
 //
 // H is Newton's wherever a sum of squares can have it, which is close to the minimum: where it is
 // positive definite and F >= |R^-T g|^2. Elsewhere it is that of reweighted squares, for which both
-// hold always.
+// hold always. Each asks for a pass of its own, so that after a point where Newton's fails it is
+// not tried at the next 1, 2, 4, 8, 8.. points.
 //
 // A step that leaves the bounds is cut where it first meets one; the solver is then to be stopped
 // (left_bounds) and started again without the variable that met its bound. Ceres' own bounds are
@@ -52,10 +53,18 @@ class CompressedCost final : public ceres::CostFunction {
   // Nothing where the curvature is Newton's and no sum of squares can have it.
   std::optional<Block> compress(const double* free_values, Curvature curvature) const;
 
+  // Newton's or the other, and the same whenever a point is asked about.
+  Block compress(const double* free_values) const;
+
   const Objective& objective_;
   std::vector<int> free_;
   // Where the derivatives were last asked for: the point that the next step starts from.
   mutable Eigen::VectorXd x_;
+  // The latest point, what its matrix was, how many points Newton's was not to be tried at, and at
+  // how many more it is not.
+  mutable Eigen::VectorXd point_;
+  mutable Curvature curvature_ = Curvature::newton;
+  mutable int pause_ = 0, waiting_ = 0;
   const Monitor& monitor_;
 };
 

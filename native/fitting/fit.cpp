@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 // Samples that the best starts are polished on, one in how many of these that all starts are tried
 // on, and one in how many of the latter that are scanned for starts.
 constexpr std::size_t finalist_samples = 16000, finalists_to_candidates = 8, candidates_to_scan = 4;
-constexpr std::size_t max_candidates = 6, max_finalists = 2;
+constexpr std::size_t max_candidates = 8, max_finalists = 3;
 // Starts that end this close to the best one, relatively, have found the same optimum.
 constexpr double agreement = 0.005;
 constexpr const char* scan_stage = "Looking for starts";
@@ -48,7 +48,8 @@ class Fitter {
         options_(options),
         monitor_(monitor),
         threads_(thread_count(options.threads)),
-        variables_(options.kind, options.fresnel, options.separate_channels),
+        variables_(options.kind, options.fresnel, options.separate_channels,
+                   options.schedule == Schedule::stages ? Specular::coefficient : Specular::peak),
         all_(all_samples(measurement, options)),
         some_(subsample(all_, finalist_samples, threads_)),
         few_(every_nth(some_, finalists_to_candidates)) {
@@ -66,7 +67,7 @@ class Fitter {
     const std::vector<Candidate> starts = find_starts();
     fit_.start_seconds = start_watch.seconds();
     const Stopwatch fit_watch;
-    const VectorXd x = run_schedule(starts);
+    const VectorXd x = without_dust(run_schedule(starts));
     fit_.fit_seconds = fit_watch.seconds();
     fit_.parameters = variables_.to_parameters(x, all_.unit);
     if (options_.uncertainty) {
@@ -106,6 +107,15 @@ class Fitter {
     return run_polish(starts);
   }
 
+  // x without a specular part that is too dark to change a stored value: what rounding left of
+  // none.
+  VectorXd without_dust(VectorXd x) const {
+    constexpr double dust = 1e-9;
+    const Parameters lobe = as_interpolated(variables_.to_parameters(x, 1));
+    if (lobe.specular.maxCoeff() < dust) x.segment<3>(Variables::specular).setZero();
+    return x;
+  }
+
   VectorXd run_stages(VectorXd x) {
     const std::pair<const char*, std::vector<int>> stages[] = {
         {"(i) rho_d, k_s", variables_.reflectances()},
@@ -135,13 +145,32 @@ class Fitter {
     std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision(), stage);
     judge_certainty(minima);
     monitor_.report("Trying the best of them", 0.5);
-    minima.resize(std::min(minima.size(), max_finalists));
     const std::vector<Minimum> finalists =
-        polish(some_, starts_of(minima), finishing_precision(), stage);
+        polish(some_, starts_of(best_of_each_shape(minima)), finishing_precision(), stage);
     fit_.converged = finalists.front().converged;
     stage.seconds = watch.seconds();
     fit_.stages.push_back(stage);
     return finalists.front().x;
+  }
+
+  // Of sorted minima the best ones; where several have one shape, it is polished once.
+  std::vector<Minimum> best_of_each_shape(const std::vector<Minimum>& sorted) const {
+    std::vector<Minimum> result;
+    const auto same_shape = [&](const Minimum& one, const Minimum& other) {
+      constexpr double near = 0.05;  // of log s and of alpha
+      const int first = Variables::log_exponent, alpha = variables_.interpolation();
+      const int count = variables_.exponents() + (alpha >= 0 ? 1 : 0);
+      return (one.x.segment(first, count) - other.x.segment(first, count)).cwiseAbs().maxCoeff() <
+             near;
+    };
+    for (const Minimum& minimum : sorted) {
+      if (result.size() == max_finalists) break;
+      const bool seen = std::any_of(result.begin(), result.end(), [&](const Minimum& better) {
+        return same_shape(minimum, better);
+      });
+      if (!seen) result.push_back(minimum);
+    }
+    return result;
   }
 
   VectorXd run_subsample(const std::vector<Candidate>& candidates) {
@@ -263,6 +292,11 @@ class Fitter {
       } else if (x[Variables::log_exponent + i] < std::log(0.5)) {
         warn("The exponent is below 0.5; the lobe is as wide as a diffuse part.");
       }
+    }
+    // Beyond the first theta_h such a lobe has not a thousandth of its light.
+    const double beside = 1 - std::pow(bin_centres().cos_h[1], 4);
+    if (as_interpolated(fit_.parameters).exponent.maxCoeff() * beside > std::log(1000)) {
+      warn("The lobe is narrower than the bins; the data only tell that it is.");
     }
     const int ior = variables_.log_excess_ior();
     if (at_bound(ior) || (ior >= 0 && x[ior] < std::log(0.01))) {

@@ -18,10 +18,11 @@ constexpr double student_t = 2.064;
 
 // A single level of smoothing, since every fit starts close by: a finer one changes the intervals
 // by a twentieth, and a coarser tolerance leaves metals half way.
-Precision precision() { return {{0.03}, 1e-6, 100}; }
+Precision precision() { return {0, 0.03, 1e-6, 100}; }
 
 // Which variables to move together, one after the other. For s < 1 the slope by alpha has no bound
-// at the edge of the lobe, where it holds Newton's steps up: the others then move first.
+// at the edge of the lobe, where it holds Newton's steps up: the others then move first. Nor does a
+// step lead away from its bounds there, so that it starts beside them (`inside`).
 std::vector<std::vector<int>> stages(const Variables& variables, const VectorXd& x) {
   std::vector<std::vector<int>> result = {variables.all()};
   const auto exponents = x.segment(Variables::log_exponent, variables.exponents());
@@ -31,6 +32,14 @@ std::vector<std::vector<int>> stages(const Variables& variables, const VectorXd&
     result.insert(result.begin(), without);
   }
   return result;
+}
+
+VectorXd inside(const Variables& variables, VectorXd x) {
+  constexpr double beside = 0.05;
+  if (stages(variables, x).size() == 1) return x;
+  double& alpha = x[variables.interpolation()];
+  alpha = std::clamp(alpha, beside, 1 - beside);
+  return x;
 }
 
 // Splits the samples of a strip into patches of theta_h: u_blinn = 1 - cos^4 theta_h rises with it.
@@ -127,15 +136,17 @@ Uncertainty jackknife(const Samples& samples, const Variables& variables, Norm n
     return from;
   };
   const std::vector<int> block = jackknife_block_of(samples);
-  const VectorXd optimum = fitted(samples, x, threads);
+  const VectorXd optimum = fitted(samples, inside(variables, x), threads);
   MatrixXd results(x.size(), jackknife_blocks);
   parallel_for(jackknife_blocks, threads, [&](int b) {
-    results.col(b) = fitted(without_block(samples, block, b), optimum, 1);
+    results.col(b) =
+        variables.with_coefficients(fitted(without_block(samples, block, b), optimum, 1));
   });
   const MatrixXd covariance = jackknife_covariance(results);
   const VectorXd reach = student_t * covariance.diagonal().cwiseSqrt();
-  VectorXd low = variables.clamp(x - reach), high = variables.clamp(x + reach);
-  const Objective objective(samples, variables, norm, precision().smoothing.back(), 1);
+  const VectorXd middle = variables.with_coefficients(x);
+  VectorXd low = variables.clamp(middle - reach), high = variables.clamp(middle + reach);
+  const Objective objective(samples, variables, norm, precision().finest, 1);
   const MatrixXd curvature = objective.evaluate(x).hessian;
   for (int i = Variables::log_exponent; i < variables.count(); ++i) {
     if (curvature(i, i) > 0) continue;
@@ -143,11 +154,13 @@ Uncertainty jackknife(const Samples& samples, const Variables& variables, Norm n
     high[i] = variables.upper()[i];
   }
   Uncertainty found;
-  found.low = variables.to_parameters(low, samples.unit);
-  found.high = variables.to_parameters(high, samples.unit);
+  const Variables reported(variables.kind(), variables.log_excess_ior() >= 0,
+                           variables.exponents() == 3, Specular::coefficient);
+  found.low = reported.to_parameters(low, samples.unit);
+  found.high = reported.to_parameters(high, samples.unit);
   found.correlation = correlation_of(covariance);
   found.blocks = jackknife_blocks;
-  const Judge judge(variables, x, low, high);
+  const Judge judge(variables, middle, low, high);
   const std::vector<std::string> names = variables.names();
   for (int i = 0; i < variables.count(); ++i) {
     if (!judge.determined(i)) found.undetermined.push_back(names[static_cast<std::size_t>(i)]);

@@ -39,7 +39,8 @@ std::vector<int> jackknife_block_of(const Samples& samples);
 //
 //   covariance = (n - 1)/n sum (x_b - mean)(x_b - mean)'
 //
-// in the scale of the variables (log s, log(eta - 1), reflectances as they are). The intervals are
+// in the scale of the variables (log s, log(eta - 1), reflectances as they are, and the specular
+// ones as the model's coefficients, whatever `variables` fit). The intervals are
 // x -+ t sqrt(variance), where t = 2.064 is the two-sided 95 % quantile of Student's distribution
 // of n - 1 = 24 degrees of freedom, since the variance comes from that few deviations. Errors that
 // go together over more than half a block make them too narrow (the coverage of 95 % falls to some

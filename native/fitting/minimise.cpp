@@ -3,6 +3,8 @@
 #include <ceres/ceres.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "fitting/compressed_cost.h"
 #include "fitting/objective.h"
@@ -94,12 +96,34 @@ void solve_level(const Objective& objective, const std::vector<int>& free,
 
 bool has_smoothing(Norm norm) { return norm == Norm::l1 || norm == Norm::cosine_l1; }
 
+// The smoothing of each level, the last the finest.
+std::vector<double> levels(const Precision& precision, double mean_misfit) {
+  constexpr double step = 4;
+  std::vector<double> result = {precision.finest};
+  while (result.front() * step <= precision.widest * mean_misfit) {
+    result.insert(result.begin(), result.front() * step);
+  }
+  return result;
+}
+
+// Of each value, in units of the median reflectance.
+double mean_misfit(const Samples& samples, const Variables& variables, const VectorXd& x,
+                   int threads) {
+  constexpr double smoothing = 1;  // which the true value does not have
+  constexpr double values_of_a_sample = 6;
+  const double weight = std::accumulate(samples.weight.begin(), samples.weight.end(), 0.0);
+  const Objective objective(samples, variables, Norm::l1, smoothing, threads);
+  const double mean =
+      objective.evaluate(x, Curvature::newton).true_value / (values_of_a_sample * weight);
+  return std::isfinite(mean) ? mean : 0;
+}
+
 }  // namespace
 
-Precision coarse_precision() { return {{0.1, 0.03}, 1e-4, 60}; }
-Precision fine_precision() { return {{0.1, 0.03, 0.01}, 1e-7, 100}; }
-Precision finishing_precision() { return {{0.03, 0.01}, 1e-6, 100}; }
-Precision last_precision() { return {{0.01}, 2e-6, 30}; }
+Precision coarse_precision() { return {1, 0.04, 1e-4, 100}; }
+Precision fine_precision() { return {1, 0.01, 1e-7, 100}; }
+Precision finishing_precision() { return {1, 0.01, 1e-6, 100}; }
+Precision last_precision() { return {0, 0.01, 2e-6, 30}; }
 
 Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const VectorXd& x, const Precision& precision,
@@ -107,13 +131,16 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
   constexpr double unknown = std::numeric_limits<double>::infinity();
   Minimum best{variables.clamp(x), unknown, unknown, 0, 0, false};
   Minimum current = best;
-  const std::size_t levels = has_smoothing(norm) ? precision.smoothing.size() : 1;
-  for (std::size_t level = 0; level < levels; ++level) {
-    const Objective objective(samples, variables, norm, precision.smoothing[level], threads);
+  const bool wide = has_smoothing(norm) && precision.widest > 0;
+  if (wide) ++current.passes;
+  for (const double smoothing :
+       levels(precision, wide ? mean_misfit(samples, variables, current.x, threads) : 0)) {
+    const Objective objective(samples, variables, norm, smoothing, threads);
     current.converged = false;
-    if (level == 0) {
+    if (std::isinf(current.start_value)) {
       current.start_value = objective.evaluate(current.x, Curvature::newton).true_value;
     }
+    const double before = current.true_value;
     solve_level(objective, free, precision, monitor, current);
     current.true_value = objective.evaluate(current.x, Curvature::newton).true_value;
     const double gain = best.true_value - current.true_value;
@@ -121,7 +148,7 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
     current.passes += objective.passes();
     best.iterations = current.iterations;
     best.passes = current.passes;
-    if (gain < 1e-6 * best.true_value && level > 0) break;
+    if (std::abs(before - current.true_value) < 1e-6 * best.true_value) break;
   }
   return best;
 }

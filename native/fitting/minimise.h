@@ -20,16 +20,18 @@ struct Minimum {
   bool converged = false;
 };
 
-// How finely to minimise: the smoothing e of each level in units of the median reflectance, and
-// the relative change of the objective at which a level ends.
+// How finely to minimise. The smoothing e falls from level to level by a factor of 4, down to
+// `finest` in units of the median reflectance, from `widest` times the mean misfit of the start on.
+// A wide one sees the way that the bulk of the misfit goes: where most of it stands in a few
+// grazing bins, thousands of times above the median, a narrow one is stuck at nearly every point.
 struct Precision {
-  std::vector<double> smoothing;
-  double tolerance;
-  int iterations;
+  double widest, finest;
+  double tolerance;  // the relative change of the objective at which a level ends
+  int iterations;    // of a solve
 };
 Precision coarse_precision();     // to choose between starts
 Precision fine_precision();       // from anywhere
-Precision finishing_precision();  // from close by
+Precision finishing_precision();  // from the minimum of a smaller subsample
 Precision last_precision();       // from the minimum of a subsample
 
 // Moves the variables `free` from x, level by level of smoothing, until the unsmoothed objective

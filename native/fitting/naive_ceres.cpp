@@ -102,7 +102,7 @@ NaiveFit fit_naively(const Samples& samples, const Parameters& start, int thread
   const Variables variables(ModelKind::interpolated, true, false);
   Eigen::VectorXd x = variables.from_parameters(start, samples.unit);
 
-  ceres::SoftLOneLoss loss(fine_precision().smoothing.back());
+  ceres::SoftLOneLoss loss(fine_precision().finest);
   std::deque<ceres::ScaledLoss> scaled;
   ceres::Problem problem(problem_options());
   problem.AddParameterBlock(x.data(), variable_count);

@@ -36,18 +36,6 @@ struct LobeVariables {
   int alpha, third, count;
 };
 
-// k_s of a rho_s of 1, its logarithmic slope by log s, and the slope of that.
-struct SpecularScale {
-  double factor, log_slope, log_curvature;
-};
-
-SpecularScale scale_at(ModelKind kind, double s) {
-  const double factor = specular_scale(kind, s);
-  if (kind == ModelKind::interpolated) return {factor, 0, 0};
-  const double shift = kind == ModelKind::modified_phong ? 2 : 8;
-  return {factor, s / (s + shift), s * shift / ((s + shift) * (s + shift))};
-}
-
 class Assembly {
  public:
   Assembly(const Variables& variables, const VectorXd& x)
@@ -123,10 +111,9 @@ class Assembly {
     MatrixXd chain = MatrixXd::Zero(lobe_.count, variables_.count());
     chain.block<3, 3>(0, Variables::diffuse).setIdentity();
     for (int c = 0; c < 3; ++c) {
-      const int exponent = Variables::log_exponent + (groups() == 3 ? c : 0);
-      const SpecularScale scale = scale_at(variables_.kind(), std::exp(x_[exponent]));
+      const SpecularScale scale = variables_.specular_scale(x_, c);
       chain(3 + c, Variables::specular + c) = scale.factor;
-      chain(3 + c, exponent) = parameters_.specular[c] * scale.log_slope;
+      if (scale.by >= 0) chain(3 + c, scale.by) = parameters_.specular[c] * scale.log_slope;
     }
     chain.block(6, Variables::log_exponent, groups(), groups()).setIdentity();
     if (variables_.interpolation() >= 0) chain(lobe_.alpha, variables_.interpolation()) = 1;
@@ -134,17 +121,17 @@ class Assembly {
     return chain;
   }
 
-  // What the curvature of k_s as a function of rho_s and log s adds to the matrix of the fit's
-  // variables, given the gradient by the lobe's.
+  // What the curvature of k_s as a function of the specular variable and of another adds to the
+  // matrix of the fit's variables, given the gradient by the lobe's.
   void add_scale_curvature(const VectorXd& gradient, MatrixXd& hessian) const {
     for (int c = 0; c < 3; ++c) {
-      const int rho = Variables::specular + c;
-      const int exponent = Variables::log_exponent + (groups() == 3 ? c : 0);
-      const SpecularScale scale = scale_at(variables_.kind(), std::exp(x_[exponent]));
+      const int specular = Variables::specular + c;
+      const SpecularScale scale = variables_.specular_scale(x_, c);
+      if (scale.by < 0) continue;
       const double both = gradient[3 + c] * scale.factor * scale.log_slope;
-      hessian(rho, exponent) += both;
-      hessian(exponent, rho) += both;
-      hessian(exponent, exponent) += gradient[3 + c] * parameters_.specular[c] *
+      hessian(specular, scale.by) += both;
+      hessian(scale.by, specular) += both;
+      hessian(scale.by, scale.by) += gradient[3 + c] * parameters_.specular[c] *
                                      (scale.log_slope * scale.log_slope + scale.log_curvature);
     }
   }

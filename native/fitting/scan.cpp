@@ -15,21 +15,26 @@ namespace {
 using Eigen::VectorXd;
 
 // s from .1 to 3e5 in thirds of a decade, and one that lights little more than the first theta_h;
-// alpha; eta - 1 from a weak dielectric to a mirror at all angles.
+// alpha, where the least more than 0 tells sharp lobes apart at grazing angles; eta - 1 from where
+// it makes one number with k_s to a mirror at all angles.
 constexpr int exponent_steps = 21, steps_a_decade = 3;
 constexpr double sharpest = 1e7;
-constexpr std::array<double, 5> interpolations = {0, 0.25, 0.5, 0.75, 1};
-constexpr std::array<double, 5> excess_iors = {0.15, 0.5, 1.5, 6, 60};
+constexpr std::array<double, 6> interpolations = {0, 0.02, 0.25, 0.5, 0.75, 1};
+constexpr std::array<double, 6> excess_iors = {0.01, 0.15, 0.5, 1.5, 6, 60};
 
 double log_exponent_at(int step) {
   if (step == exponent_steps - 1) return std::log(sharpest);
   return std::log(10) * (double(step) / steps_a_decade - 1);
 }
 
-// The columns of the grid: one for every (alpha, eta) that the model has.
+// The columns of the grid, one for every (alpha, eta) that the model has, and their points, one for
+// every s.
 struct Grid {
   int interpolations_used, iors_used;
   int columns() const { return interpolations_used * iors_used; }
+  std::size_t point(int a, int e, int step) const {
+    return static_cast<std::size_t>((e * interpolations_used + a) * exponent_steps + step);
+  }
 };
 
 // Finds reflectances channel by channel, in single precision, which tells basins apart as well as
@@ -123,28 +128,27 @@ ReflectanceSolver::Column lobe_at(const Samples& samples, const Parameters& lobe
   return g.cast<float>();
 }
 
-// The best exponent of one column; its alpha and eta are those of x, where it starts.
-Candidate scan_column(const Samples& samples, const Variables& variables,
-                      const ReflectanceSolver& solver, VectorXd x, const Monitor& monitor) {
-  Candidate best{x, std::numeric_limits<double>::infinity()};
+// Fills one column of points; its alpha and eta are those of x, where it starts.
+void scan_column(const Samples& samples, const Variables& variables,
+                 const ReflectanceSolver& solver, VectorXd x, const Monitor& monitor,
+                 Candidate* points) {
   for (int step = 0; step < exponent_steps; ++step) {
     monitor.throw_if_cancelled();
     const double log_exponent = log_exponent_at(step);
     x.segment(Variables::log_exponent, variables.exponents()).setConstant(log_exponent);
     const auto g = lobe_at(samples, as_interpolated(variables.to_parameters(x, 1)));
-    const double scale = specular_scale(variables.kind(), std::exp(log_exponent));
     double value = 0;
     // The reflectances of one exponent are close to those of the next.
     for (int c = 0; c < 3; ++c) {
       auto diffuse = static_cast<float>(x[Variables::diffuse + c]);
+      const double scale = variables.specular_scale(x, c).factor;
       auto specular = static_cast<float>(scale * x[Variables::specular + c]);
       value += solver.solve(c, g, diffuse, specular);
       x[Variables::diffuse + c] = diffuse;
       x[Variables::specular + c] = specular / scale;
     }
-    if (value < best.true_value) best = {x, value};
+    points[step] = {x, value};
   }
-  return best;
 }
 
 // Where a column begins: diffuse alone.
@@ -160,7 +164,37 @@ VectorXd column_start(const Variables& variables, int a, int e) {
   return x;
 }
 
-// The best of the sorted candidates, the best Phong (alpha = 0) and Blinn-Phong (alpha = 1) lobes
+// The best point of every column and those from which no step along an axis leads down, best first.
+std::vector<Candidate> sorted_starts(const Grid& grid, const std::vector<Candidate>& points) {
+  std::vector<Candidate> starts;
+  const auto best_first = [](const Candidate& left, const Candidate& right) {
+    return left.true_value < right.true_value;
+  };
+  const auto is_lowest = [&](int a, int e, int step) {
+    const double value = points[grid.point(a, e, step)].true_value;
+    const auto leads_down = [&](int to_a, int to_e, int to_step) {
+      return to_a >= 0 && to_a < grid.interpolations_used && to_e >= 0 && to_e < grid.iors_used &&
+             to_step >= 0 && to_step < exponent_steps &&
+             points[grid.point(to_a, to_e, to_step)].true_value < value;
+    };
+    return !(leads_down(a - 1, e, step) || leads_down(a + 1, e, step) ||
+             leads_down(a, e - 1, step) || leads_down(a, e + 1, step) ||
+             leads_down(a, e, step - 1) || leads_down(a, e, step + 1));
+  };
+  for (int e = 0; e < grid.iors_used; ++e) {
+    for (int a = 0; a < grid.interpolations_used; ++a) {
+      const auto column = points.begin() + static_cast<std::ptrdiff_t>(grid.point(a, e, 0));
+      const auto best = std::min_element(column, column + exponent_steps, best_first);
+      for (int step = 0; step < exponent_steps; ++step) {
+        if (column + step == best || is_lowest(a, e, step)) starts.push_back(column[step]);
+      }
+    }
+  }
+  std::stable_sort(starts.begin(), starts.end(), best_first);
+  return starts;
+}
+
+// The first of the sorted candidates, the first Phong (alpha = 0) and Blinn-Phong (alpha = 1) lobes
 // always among them.
 std::vector<Candidate> chosen(const std::vector<Candidate>& sorted, int interpolation,
                               std::size_t count) {
@@ -185,16 +219,13 @@ std::vector<Candidate> scan_shapes(const Samples& few, const Variables& variable
   const Grid grid{variables.interpolation() >= 0 ? static_cast<int>(interpolations.size()) : 1,
                   variables.log_excess_ior() >= 0 ? static_cast<int>(excess_iors.size()) : 1};
   const ReflectanceSolver solver(few, norm);
-  std::vector<Candidate> best(static_cast<std::size_t>(grid.columns()));
+  std::vector<Candidate> points(grid.point(0, grid.iors_used, 0));
   parallel_for(grid.columns(), threads, [&](int column) {
     const int a = column % grid.interpolations_used, e = column / grid.interpolations_used;
-    best[static_cast<std::size_t>(column)] =
-        scan_column(few, variables, solver, column_start(variables, a, e), monitor);
+    scan_column(few, variables, solver, column_start(variables, a, e), monitor,
+                points.data() + grid.point(a, e, 0));
   });
-  std::sort(best.begin(), best.end(), [](const Candidate& left, const Candidate& right) {
-    return left.true_value < right.true_value;
-  });
-  return chosen(best, variables.interpolation(), count);
+  return chosen(sorted_starts(grid, points), variables.interpolation(), count);
 }
 
 }  // namespace lobefit

@@ -15,8 +15,8 @@ constexpr double min_excess_ior = 1e-4, max_excess_ior = 199;
 
 }  // namespace
 
-Variables::Variables(ModelKind kind, bool fresnel, bool separate_channels)
-    : kind_(kind), exponents_(separate_channels ? 3 : 1) {
+Variables::Variables(ModelKind kind, bool fresnel, bool separate_channels, Specular specular_is)
+    : kind_(kind), specular_is_(specular_is), exponents_(separate_channels ? 3 : 1) {
   int count = log_exponent + exponents_;
   if (kind == ModelKind::interpolated) interpolation_ = count++;
   if (fresnel) log_excess_ior_ = count++;
@@ -33,6 +33,22 @@ Variables::Variables(ModelKind kind, bool fresnel, bool separate_channels)
 
 Eigen::VectorXd Variables::clamp(const Eigen::VectorXd& x) const {
   return x.cwiseMax(lower_).cwiseMin(upper_);
+}
+
+SpecularScale Variables::specular_scale(const Eigen::VectorXd& x, int channel) const {
+  if (specular_is_ == Specular::peak) {
+    if (log_excess_ior_ < 0) return {1, -1, 0, 0};
+    // 1 / R_F = (1 + 2 / (eta - 1))^2 for light from the normal.
+    const double excess = std::exp(x[log_excess_ior_]), sum = excess + 2;
+    const double root = sum / excess;
+    return {root * root, log_excess_ior_, -4 / sum, 4 * excess / (sum * sum)};
+  }
+  const int exponent = exponent_of(channel);
+  const double s = std::exp(x[exponent]);
+  const double factor = lobefit::specular_scale(kind_, s);
+  if (kind_ == ModelKind::interpolated) return {factor, -1, 0, 0};
+  const double shift = kind_ == ModelKind::modified_phong ? 2 : 8;
+  return {factor, exponent, s / (s + shift), s * shift / ((s + shift) * (s + shift))};
 }
 
 std::vector<int> Variables::all() const {
@@ -72,14 +88,24 @@ std::vector<std::string> Variables::names() const {
   return names;
 }
 
+double Variables::coefficient_scale(const Eigen::VectorXd& x, int channel) const {
+  if (specular_is_ == Specular::coefficient) return 1;
+  return specular_scale(x, channel).factor /
+         lobefit::specular_scale(kind_, std::exp(x[exponent_of(channel)]));
+}
+
+Eigen::VectorXd Variables::with_coefficients(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd result = x;
+  for (int c = 0; c < 3; ++c) result[specular + c] *= coefficient_scale(x, c);
+  return result;
+}
+
 Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const {
   Parameters parameters;
   parameters.kind = kind_;
   parameters.diffuse = x.segment<3>(diffuse).array() * (unit * pi);
-  parameters.specular = x.segment<3>(specular).array() * unit;
-  for (int c = 0; c < 3; ++c) {
-    parameters.exponent[c] = std::exp(x[log_exponent + (exponents_ == 3 ? c : 0)]);
-  }
+  parameters.specular = with_coefficients(x).segment<3>(specular).array() * unit;
+  for (int c = 0; c < 3; ++c) parameters.exponent[c] = std::exp(x[exponent_of(c)]);
   if (interpolation_ >= 0) parameters.interpolation = x[interpolation_];
   if (log_excess_ior_ >= 0) parameters.ior = 1 + std::exp(x[log_excess_ior_]);
   return parameters;
@@ -88,10 +114,12 @@ Parameters Variables::to_parameters(const Eigen::VectorXd& x, double unit) const
 Eigen::VectorXd Variables::from_parameters(const Parameters& parameters, double unit) const {
   Eigen::VectorXd x(count());
   x.segment<3>(diffuse) = parameters.diffuse / (unit * pi);
-  x.segment<3>(specular) = parameters.specular / unit;
   x.segment(log_exponent, exponents_) = parameters.exponent.head(exponents_).log();
   if (interpolation_ >= 0) x[interpolation_] = parameters.interpolation;
   if (log_excess_ior_ >= 0) x[log_excess_ior_] = std::log(parameters.ior.value() - 1);
+  for (int c = 0; c < 3; ++c) {
+    x[specular + c] = parameters.specular[c] / unit / coefficient_scale(x, c);
+  }
   return clamp(x);
 }
 

@@ -683,7 +683,7 @@ py::dict l1_problem(const Measurement& measurement, int bins) {
     return std::vector<double>(x.begin(), x.end());
   };
   const Samples samples = samples_for_others(measurement, bins, 0);
-  return py::dict("unit"_a = samples.unit, "smoothing"_a = fine_precision().smoothing.back(),
+  return py::dict("unit"_a = samples.unit, "smoothing"_a = fine_precision().finest,
                   "lower"_a = list(variables.lower()), "upper"_a = list(variables.upper()),
                   "columns"_a = to_columns(samples));
 }

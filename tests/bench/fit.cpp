@@ -84,12 +84,13 @@ struct Parts {
   const FitOptions options;
   const Monitor monitor;
   const int threads = thread_count(0);
-  const Variables variables{options.kind, options.fresnel, options.separate_channels};
+  const Variables variables{options.kind, options.fresnel, options.separate_channels,
+                            Specular::peak};
   const Samples all = all_samples(sample(), options);
   const Samples some = subsample(all, 16000, threads), scanned = every_nth(some, 32);
 
   std::vector<Candidate> starts() const {
-    return scan_shapes(scanned, variables, options.norm, 6, threads, monitor);
+    return scan_shapes(scanned, variables, options.norm, 8, threads, monitor);
   }
   Minimum polish(const Samples& samples, const Eigen::VectorXd& x, const Precision& precision,
                  int by_threads) const {
@@ -143,11 +144,11 @@ void polish_on(benchmark::State& state, const Samples& samples, const Eigen::Vec
 }
 
 Minimum polished_on_subsample() {
-  return parts().polish(parts().some, parts().starts().front().x, fine_precision(), 1);
+  return parts().polish(parts().some, parts().starts().front().x, finishing_precision(), 1);
 }
 
 void polish_on_subsample(benchmark::State& state) {
-  polish_on(state, parts().some, parts().starts().front().x, fine_precision(), 1);
+  polish_on(state, parts().some, parts().starts().front().x, finishing_precision(), 1);
 }
 
 void polish_on_all(benchmark::State& state) {

@@ -33,18 +33,20 @@ Real fresnel(Real cosine, Real ior) {
 // The three models with Fresnel and a shared exponent.
 struct Model {
   ModelKind kind;
-  Variables variables{kind, true, false};
+  Specular specular;
+  Variables variables{kind, true, false, specular};
 
   Real lobe(const RealVector& x, Real u_phong, Real u_blinn) const {
     const Real s = std::exp(x[6]);
+    const bool peak = specular == Specular::peak;
     const auto power = [](Real u, Real exponent) {
       return u < 1 ? std::exp(exponent * std::log1p(-u)) : 0;
     };
     switch (kind) {
       case ModelKind::modified_phong:
-        return (s + 2) / (2 * static_cast<Real>(pi)) * power(u_phong, s);
+        return (peak ? 1 : (s + 2) / (2 * static_cast<Real>(pi))) * power(u_phong, s);
       case ModelKind::modified_blinn_phong:
-        return (s + 8) / (8 * static_cast<Real>(pi)) * power(u_blinn, s / 4);
+        return (peak ? 1 : (s + 8) / (8 * static_cast<Real>(pi))) * power(u_blinn, s / 4);
       case ModelKind::interpolated:
         break;
     }
@@ -55,7 +57,9 @@ struct Model {
   Real value(const Samples& samples, const RealVector& x) const {
     Real sum = 0;
     for (const Samples::Run& run : samples.runs) {
-      const Real reflected = fresnel(run.cos_theta_d, 1 + std::exp(x.back()));
+      const Real ior = 1 + std::exp(x.back());
+      const Real reflected =
+          fresnel(run.cos_theta_d, ior) / (specular == Specular::peak ? fresnel(1, ior) : 1);
       for (std::size_t i = run.begin; i < run.end; ++i) {
         if (!(samples.weight[i] > 0)) continue;
         const Real g = reflected * lobe(x, samples.u_phong[i], samples.u_blinn[i]);
@@ -75,6 +79,7 @@ struct Point {
   std::string name;
   ModelKind kind = ModelKind::interpolated;
   std::function<void(VectorXd&)> move;  // from a point inside
+  Specular specular = Specular::coefficient;
 };
 
 // GoogleTest would print the bytes, those between the members too, which nobody has written.
@@ -103,6 +108,14 @@ void with_excess_ior(VectorXd& x, double excess) {
 
 std::vector<Point> points() {
   const auto set = [](int i, double value) { return [=](VectorXd& x) { x[i] = value; }; };
+  // A peak of about the k_s R_F of the other points.
+  const auto as_bright = [](VectorXd& x) { x.segment<3>(Variables::specular) *= 0.05; };
+  const auto peak_at = [=](double excess) {
+    return [=](VectorXd& x) {
+      as_bright(x);
+      x[8] = std::log(excess);
+    };
+  };
   const ModelKind phong = ModelKind::modified_phong, blinn = ModelKind::modified_blinn_phong;
   const ModelKind both = ModelKind::interpolated;
   return {{"inside", both, [](VectorXd&) {}},
@@ -116,13 +129,18 @@ std::vector<Point> points() {
           {"eta near 1", both, [](VectorXd& x) { with_excess_ior(x, 1e-4); }},
           {"eta = 200", both, [](VectorXd& x) { with_excess_ior(x, 199); }},
           {"k_s = 0", both, [](VectorXd& x) { x.segment<3>(3).setZero(); }},
-          {"rho_d = 0", both, [](VectorXd& x) { x.head<3>().setZero(); }}};
+          {"rho_d = 0", both, [](VectorXd& x) { x.head<3>().setZero(); }},
+          {"peak inside", both, as_bright, Specular::peak},
+          {"peak of phong", phong, as_bright, Specular::peak},
+          {"peak of blinn-phong", blinn, as_bright, Specular::peak},
+          {"peak, eta near 1", both, peak_at(1e-4), Specular::peak},
+          {"peak, eta = 200", both, peak_at(199), Specular::peak}};
 }
 
 class EveryPoint : public ::testing::TestWithParam<Point> {
  protected:
   EveryPoint()
-      : model_{GetParam().kind},
+      : model_{GetParam().kind, GetParam().specular},
         x_(variables_at(GetParam())),
         samples_(subsample(all_samples(sample_measurement("violet-rubber"), {}), 500)) {
     // Where the lobe ends the objective has an edge (for s near 0 a step), which differences see.
