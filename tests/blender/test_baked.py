@@ -304,11 +304,11 @@ def test_a_normal_map_bends_the_closures(build, render, tmp_path, nickel, phase)
 
 @pytest.mark.parametrize("angle", [0, 20, 40, 60, 70, 80])
 @pytest.mark.parametrize("kind", ["fitted", "hand-made"])
-def test_a_white_world_shows_the_albedo(addon, build, tmp_path, nickel, kind, angle):
+def test_a_white_world_shows_the_albedo(two_lights, build, tmp_path, nickel, kind, angle):
     closures = nickel.closures[0]
     if kind == "hand-made":
         closures = entry(lobe("beckmann", 0.4, 0.6, 0.3), lobe("ggx", 0.5, -0.6, -0.3))
-    white = addon.scene.uniform_world("white", 1.0)
+    white = two_lights.uniform_world("white", 1.0)
     rendered = white_world_albedo(tmp_path, build(closures), white, angle)
     expected = albedo(closures, np.cos(np.radians(angle)))
     # Noise is below 1e-4; but between the horizon of the surface and that of a closure bent toward
