@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from .. import native
 from ..nodes.material import shown_by
 from ..records import KEY, active_material, record_of
+from .import_measured import GLOB_DESCRIPTION
 from .run import RunsWork
 
 SCALE_KEY = "lobefit_scale"  # of an image of heights: what 1 stands for, in widths of the image
@@ -61,7 +62,7 @@ node, and heights for displacement. The file of lights says which images belong 
         options={"SKIP_SAVE"},
         description="What lit the images (LIGHTS.json), and their names where there are several",
     )
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"}, description=GLOB_DESCRIPTION)
     image: StringProperty(
         name="Image", options={"SKIP_SAVE"}, description="Which image, where the lights name none"
     )
@@ -76,12 +77,30 @@ node, and heights for displacement. The file of lights says which images belong 
     )
     material: StringProperty(name="Material", description="A material made of a measurement")
     diffuse: FloatVectorProperty(
-        name="Diffuse", subtype="COLOR", size=3, default=(0.8, 0.8, 0.8), min=0.0, soft_max=1.0
+        name="Diffuse",
+        subtype="COLOR",
+        size=3,
+        default=(0.8, 0.8, 0.8),
+        min=0.0,
+        soft_max=1.0,
+        description="Color of the light that goes everywhere",
     )
     specular: FloatVectorProperty(
-        name="Specular", subtype="COLOR", size=3, default=(0.0, 0.0, 0.0), min=0.0, soft_max=1.0
+        name="Specular",
+        subtype="COLOR",
+        size=3,
+        default=(0.0, 0.0, 0.0),
+        min=0.0,
+        soft_max=1.0,
+        description="Color of the highlight",
     )
-    exponent: FloatProperty(name="Exponent", default=50.0, min=0.0, soft_max=1000.0)
+    exponent: FloatProperty(
+        name="Exponent",
+        default=50.0,
+        min=0.0,
+        soft_max=1000.0,
+        description="How narrow the highlight is",
+    )
     heights: BoolProperty(
         name="Heights", default=True, description="Also make an image for a Displacement node"
     )
