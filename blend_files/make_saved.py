@@ -38,10 +38,12 @@ ROUND = 3  # subdivisions of the sphere: 162 vertices
 VERSIONS: dict[str, tuple[str | None, tuple[str, ...]]] = {
     "live-1": ("7c1bbf70a7675ed3ece4cbf5a8af590afcda4b2f", ("live", "principled")),
     "live-2": ("29dee27ba4691faf9e2b99f6216da41fc0558560", ("live", "principled")),
-    "live-3": (None, ("live", "principled")),
+    "live-3": ("c9df98d3f965c94e5177f2b6313037707aa1ec4a", ("live", "principled")),
     "baked-1": ("f253ca022a0fc31b8e7043fdf8bc2bb624c4f408", ("measured", "lobe")),
-    "baked-2": (None, ("measured", "lobe", "bounces")),
+    "baked-2": ("c9df98d3f965c94e5177f2b6313037707aa1ec4a", ("measured", "lobe", "bounces")),
     "classic-1": (None, ("classic",)),
+    # From here on a material tells which version built it.
+    "material-1": (None, ("live", "principled", "measured", "lobe", "bounces")),
 }
 # What records did not hold at the time of the first version.
 LATER = ("closures", "error_by_angle", "uncertainty")
