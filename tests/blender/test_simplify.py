@@ -7,6 +7,7 @@ import bpy
 import lobefit
 import numpy as np
 import pytest
+from conftest import EXTENSION
 from mathutils import Vector
 
 SAMPLES = ("nickel", "violet-rubber")
@@ -371,11 +372,11 @@ def test_other_renderers_see_no_change(two_spheres):
         assert [n.target for n in outputs if n.is_active_output] == ["ALL"]
 
 
-def test_the_result_is_kept(simplification, two_spheres):
+def test_the_result_is_kept(two_spheres):
     bpy.ops.lobefit.simplify_scene(tolerance=2)
-    result = records.result_of(bpy.context.scene)
-    assert result == json.loads(json.dumps(result))
-    metal, rubber = result["materials"]
+    kept = result()
+    assert kept == json.loads(json.dumps(kept))
+    metal, rubber = kept["materials"]
     assert metal["before"] == {"kind": "measured", "count": 3, "cost": 3.25}
     assert metal["left_out"].endswith("of 3 lobes")
     assert rubber["before"]["kind"] == "live" and "live sockets" in rubber["left_out"]
@@ -383,15 +384,15 @@ def test_the_result_is_kept(simplification, two_spheres):
     # Nine tenths of a sphere's area are seen between these angles.
     expected = np.degrees(np.arcsin(np.sqrt([0.05, 0.95])))
     assert metal["angles"] == pytest.approx(list(expected), abs=2)
-    assert result["error_added"] <= 0.02
-    assert result["seconds"] == {"before": None, "after": None}
+    assert kept["error_added"] <= 0.02
+    assert kept["seconds"] == {"before": None, "after": None}
 
 
-def test_rendering_is_timed(simplification, two_spheres):
+def test_rendering_is_timed(two_spheres):
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
     bpy.ops.lobefit.simplify_scene(tolerance=10, timed=True)
-    seconds = records.result_of(scene)["seconds"]
+    seconds = result()["seconds"]
     assert seconds["before"] > 0 and seconds["after"] > 0
     assert scene.render.resolution_percentage == 100
 
@@ -423,22 +424,28 @@ def test_bounces_of_a_material_are_put_back(addon, swaps, records, two_spheres):
     assert swaps.tree_content(metal.node_tree) == before
 
 
-def skipped(simplification):
+def result():
+    """What is kept of the last simplification."""
+    records = importlib.import_module(f"{EXTENSION}.records")
+    return records.result_of(bpy.context.scene)
+
+
+def skipped():
     """The reasons by material, of the scene as it is."""
-    found = records.result_of(bpy.context.scene)["skipped"]
+    found = result()["skipped"]
     return {item["material"]: item["reason"] for item in found}
 
 
-def test_what_a_user_changed_is_left(swaps, simplification, two_spheres):
+def test_what_a_user_changed_is_left(swaps, two_spheres):
     metal, _ = two_spheres
     metal.node_tree.nodes["metal measured"].inputs["Strength"].default_value = 0.5
     before = swaps.tree_content(metal.node_tree)
     bpy.ops.lobefit.simplify_scene(tolerance=10)
     assert swaps.tree_content(metal.node_tree) == before
-    assert skipped(simplification) == {"metal": "its nodes were changed by hand"}
+    assert skipped() == {"metal": "its nodes were changed by hand"}
 
 
-def test_what_a_user_changed_in_a_group_is_left(swaps, simplification, two_spheres):
+def test_what_a_user_changed_in_a_group_is_left(swaps, two_spheres):
     metal, _ = two_spheres
     group = metal.node_tree.nodes["metal measured"].node_tree
     curves = next(node for node in group.nodes if node.type == "CURVE_RGB").mapping.curves
@@ -446,10 +453,10 @@ def test_what_a_user_changed_in_a_group_is_left(swaps, simplification, two_spher
     before = swaps.tree_content(metal.node_tree)
     bpy.ops.lobefit.simplify_scene(tolerance=10)
     assert swaps.tree_content(metal.node_tree) == before
-    assert skipped(simplification) == {"metal": "its nodes were changed by hand"}
+    assert skipped() == {"metal": "its nodes were changed by hand"}
 
 
-def test_what_is_linked_is_left(addon, simplification, two_spheres, tmp_path):
+def test_what_is_linked_is_left(addon, two_spheres, tmp_path):
     metal, _ = two_spheres
     path = tmp_path / "library.blend"
     metal.name = "linked metal"
@@ -460,23 +467,23 @@ def test_what_is_linked_is_left(addon, simplification, two_spheres, tmp_path):
     metal.name = "own metal"
     sphere(linked, (0, 1, 0), radius=0.3)
     bpy.ops.lobefit.simplify_scene(tolerance=10)
-    assert skipped(simplification) == {"linked metal": "it is linked from another file"}
+    assert skipped() == {"linked metal": "it is linked from another file"}
     assert linked["lobefit_closures"] == 3 and metal["lobefit_closures"] == 1
 
 
-def test_what_only_renders_show_is_left(simplification, two_spheres):
+def test_what_only_renders_show_is_left(two_spheres):
     bpy.context.scene.objects[0].hide_viewport = True
     bpy.ops.lobefit.simplify_scene(tolerance=10)
-    (reason,) = skipped(simplification).values()
+    (reason,) = skipped().values()
     assert "the viewport hides" in reason
     assert two_spheres[0]["lobefit_closures"] == 3
 
 
-def test_materials_of_other_scenes_are_left(addon, records, simplification, two_spheres):
+def test_materials_of_other_scenes_are_left(addon, records, two_spheres):
     elsewhere = build(addon, records["nickel"], "elsewhere")
     bpy.ops.lobefit.simplify_scene(tolerance=10)
     assert elsewhere["lobefit_closures"] == 3
-    assert skipped(simplification) == {}
+    assert skipped() == {}
 
 
 def test_closures_that_are_missing_are_found(addon, records, two_spheres):
@@ -505,14 +512,14 @@ def test_missing_closures_keep_the_cap(two_spheres):
     assert [entry["cap_albedo"] for entry in closures] == [True] * 4
 
 
-def test_of_entries_with_as_many_closures_the_shown_one_is_found(simplification, two_spheres):
+def test_of_entries_with_as_many_closures_the_shown_one_is_found(two_spheres):
     metal, _ = two_spheres
     record = json.loads(metal["lobefit_record"])
     two, three = record["closures"][2:]
     two["specular"] = [*two["specular"], three["specular"][0]]
     metal["lobefit_record"] = json.dumps(record)
     bpy.ops.lobefit.simplify_scene(tolerance=0)
-    assert records.result_of(bpy.context.scene)["materials"][0]["before"]["count"] == 3
+    assert result()["materials"][0]["before"]["count"] == 3
 
 
 def test_without_closures_or_a_file(addon, two_spheres):
