@@ -241,41 +241,29 @@ Equations linearise(const SearchTarget& target, const ClosureCurves& closures, d
 }
 
 struct Bounds {
-  Eigen::MatrixXd least, greatest;  // of each unknown
+  Eigen::VectorXd least, greatest;  // of each curve's coefficients
 };
 
-Bounds bounds_of(const ClosureCurves& closures) {
-  const ClosureLayout& layout = closures.layout;
-  const Eigen::Index n = closures.x.cols();
-  Bounds bounds{Eigen::MatrixXd::Zero(layout.curves(), n),
-                Eigen::MatrixXd::Constant(layout.curves(), n, 1e6)};
+Bounds bounds_of(const ClosureLayout& layout) {
+  Bounds bounds{Eigen::VectorXd::Zero(layout.curves()),
+                Eigen::VectorXd::Constant(layout.curves(), 1e6)};
   for (int k = 0; k < layout.specular; ++k) {
-    bounds.least.row(layout.shape(k, mean)).setConstant(least_log_alpha);
-    bounds.greatest.row(layout.shape(k, mean)).setZero();
-    for (const ClosureLayout::ShapeCurve curve : {spread, bend}) {
-      bounds.least.row(layout.shape(k, curve)).setConstant(-most_bend);
-      bounds.greatest.row(layout.shape(k, curve)).setConstant(most_bend);
-    }
-    if (closures.bend_bounds.size() > 0) {
-      bounds.greatest.row(layout.shape(k, bend)) = closures.bend_bounds.transpose();
-    }
+    bounds.least.segment<3>(layout.shape(k, mean)) << least_log_alpha, -3, -3;
+    bounds.greatest.segment<3>(layout.shape(k, mean)) << 0, 3, 3;
   }
   return bounds;
-}
-
-Eigen::MatrixXd within(const Eigen::MatrixXd& x, const Bounds& bounds) {
-  return x.cwiseMax(bounds.least).cwiseMin(bounds.greatest);
 }
 
 // A damped step within the bounds. An unknown at its bound stays there while the error falls
 // outward.
 Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
                           const Equations& equations, double damping) {
+  const Eigen::Index curves = x.rows();
   std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const double at = x.data()[i];
-    const bool held =
-        equations.gradient[i] > 0 ? at <= bounds.least.data()[i] : at >= bounds.greatest.data()[i];
+    const bool held = equations.gradient[i] > 0 ? at <= bounds.least[i % curves]
+                                                : at >= bounds.greatest[i % curves];
     if (!held && equations.matrix(i, i) > 0) free.push_back(i);
   }
   const auto count = static_cast<Eigen::Index>(free.size());
@@ -299,7 +287,10 @@ Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
       matrix.solve_in_place(scale.cwiseProduct(equations.gradient(free).eval())));
   Eigen::MatrixXd tried = x;
   tried.reshaped()(free) -= step;
-  return within(tried, bounds);
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    tried.col(i) = tried.col(i).cwiseMax(bounds.least).cwiseMin(bounds.greatest);
+  }
+  return tried;
 }
 
 }  // namespace
@@ -354,26 +345,6 @@ Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& c
   return sum;
 }
 
-double light_below_horizons(const TargetView& view, const ClosureCurves& closures) {
-  const ClosureLayout& layout = closures.layout;
-  const AtView at = at_view(closures, view.wo.z());
-  const auto weight = [&](int closure) {
-    return at.curves.segment<3>(layout.weight(closure, 0)).array();
-  };
-  Rgb below = Rgb::Zero(), reflected = weight(layout.specular);
-  for (int k = 0; k < layout.specular; ++k) {
-    const Shape shape = clipped_shape(at, layout, k, view.wo.z()).shape;
-    const Microfacet closure = microfacet(closures, k, shape, view.wo);
-    for (const TargetLight& light : view.lights) {
-      const double above = closure.evaluate(light.wi, light.half);
-      reflected += light.solid_angle * above * weight(k);
-      if (above > 0 || !(shape.tilt > 0)) continue;
-      below += light.solid_angle * closure.below_horizon(light.wi, light.half) * weight(k);
-    }
-  }
-  return (reflected > 0).select(below / reflected, 0).maxCoeff();
-}
-
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {
   double sum = 0;
   for (const SearchView& view : target) sum += view_error(closures, view, smoothing);
@@ -382,8 +353,7 @@ double smooth_error(const SearchTarget& target, const ClosureCurves& closures, d
 
 ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double smoothing,
                       int iterations, const Monitor& monitor) {
-  const Bounds bounds = bounds_of(closures);
-  closures.x = within(closures.x, bounds);
+  const Bounds bounds = bounds_of(closures.layout);
   double error = smooth_error(target, closures, smoothing), damping = 1e-3;
   ClosureCurves tried = closures;
   for (int iteration = 0; iteration < iterations; ++iteration) {

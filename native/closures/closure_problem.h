@@ -56,17 +56,12 @@ struct ClosureLayout {
   int curves() const { return specular * shape_curves + closures() * 3; }
 };
 
-// No coefficient of a bend exceeds this.
-inline constexpr double most_bend = 3;
-
 // Closures on the way to their best curves: the distribution of each specular one, and the
 // unknowns, the coefficients of ViewSplines: a row for each curve, a single column for constants.
 struct ClosureCurves {
   ClosureLayout layout;
   std::vector<Distribution> distributions;
   Eigen::MatrixXd x;
-  // The bound of each coefficient of all bends; empty where they have that of most_bend alone.
-  Eigen::VectorXd bend_bounds = {};
 
   int coefficients() const { return static_cast<int>(x.cols()); }
   double at(int curve, double cosine) const {
@@ -85,11 +80,6 @@ Shape shape_at(const ClosureCurves& closures, int closure, double cosine);
 
 // What each specular closure adds to the light of a view, in units of the error.
 Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures);
-
-// What the samplers of the closures show of a white world and lamps from all around do not, between
-// the surface's horizon and those of closures bent toward the viewer, as a part of the light that
-// they reflect; the most of the channels.
-double light_below_horizons(const TargetView& view, const ClosureCurves& closures);
 
 // The error, |r| rounded off below `smoothing` times what is typical there, plus a little for
 // curvature.

@@ -20,8 +20,6 @@ constexpr std::array<double, 6> start_alphas = {0.008, 0.025, 0.07, 0.17, 0.4, 0
 constexpr std::array<double, 2> start_bends = {0.3, 0.8};
 constexpr double least_bent_alpha = 0.1;
 constexpr double start_weight = 0.1;
-// At view angles up to 80 degrees a world may show so much more than lamps from all around.
-constexpr double least_held_cosine = 0.17, most_light_below = 0.0095;
 
 // Closures with the same curves at all view angles.
 ClosureCurves constant_start(const Distributions& distributions, const std::vector<double>& alphas,
@@ -104,20 +102,10 @@ std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
   return all;
 }
 
-// Of each coefficient, the greatest of all closures.
-Eigen::VectorXd greatest_bends(const ClosureCurves& closures) {
-  Eigen::VectorXd greatest = Eigen::VectorXd::Zero(closures.coefficients());
-  for (int k = 0; k < closures.layout.specular; ++k) {
-    greatest = greatest.cwiseMax(closures.x.row(closures.layout.shape(k, bend)).transpose());
-  }
-  return greatest;
-}
-
 class Search {
  public:
   Search(const Target& target, int threads, Monitor& monitor)
-      : target_(target),
-        full_(in_columns(target)),
+      : full_(in_columns(target)),
         medium_(in_columns(thinned(target, 6, 2))),
         small_{in_columns(thinned(target, 9, 5, 0)), in_columns(thinned(target, 9, 5, 1))},
         threads_(threads),
@@ -140,10 +128,6 @@ class Search {
       for (int i = 0; i < 3; ++i) found.closures = subdivided(found.closures);
     }
     for (const double smoothing : {0.01, 0.002}) follow(full_, smoothing, 30);
-    keep(1);
-    ClosureCurves& best = found_.front().closures;
-    best.bend_bounds.setConstant(best.coefficients(), most_bend);
-    while (lower_bends_too_high()) follow(full_, 0.002, 3);
     return found_.front();
   }
 
@@ -195,23 +179,6 @@ class Search {
     return better;
   }
 
-  // Bounds the bends of the best closures anew at view angles where a world shows more than it may,
-  // a little lower than they are; false where it does nowhere.
-  bool lower_bends_too_high() {
-    ClosureCurves& closures = found_.front().closures;
-    const Eigen::VectorXd lower = 0.95 * greatest_bends(closures);
-    bool any = false;
-    for (const TargetView& view : target_) {
-      if (view.wo.z() < least_held_cosine) continue;
-      if (!(light_below_horizons(view, closures) > most_light_below)) continue;
-      const auto [first, share] = ViewSplines::at(view.wo.z(), closures.coefficients());
-      auto most = closures.bend_bounds.segment(first, share.size());
-      most = most.cwiseMin(lower.segment(first, share.size()));
-      any = true;
-    }
-    return any;
-  }
-
   void start_from(const std::vector<ClosureCurves>& starts) {
     found_.clear();
     for (const ClosureCurves& start : starts) found_.push_back({start, 0});
@@ -234,7 +201,6 @@ class Search {
 
   void keep(std::size_t most) { found_.resize(std::min(found_.size(), most), found_.front()); }
 
-  const Target& target_;
   const SearchTarget full_, medium_;
   const std::vector<SearchTarget> small_;
   const int threads_;

@@ -53,13 +53,6 @@ double Microfacet::visible(const Vector3& wi) const {
   return 1 / (masking(terms_.distribution, slope_i).value + terms_.masking_o.value);
 }
 
-double Microfacet::below_horizon(const Vector3& wi, const Vector3& half) const {
-  if (!(half.z() + terms_.tilt * half.x() > 0)) return 0;
-  return closure_value<false, double, true>(terms_, {wi.x(), wi.y(), wi.z()},
-                                            {half.x(), half.y(), half.z()})
-      .value;
-}
-
 double Microfacet::evaluate(const Vector3& wi, const Vector3& half) const {
   return closure_value<false, double>(terms_, {wi.x(), wi.y(), wi.z()},
                                       {half.x(), half.y(), half.z()})

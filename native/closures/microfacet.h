@@ -35,8 +35,6 @@ class Microfacet {
 
   // For a light at wi and the half vector of wi and wo, both of unit length.
   double evaluate(const Vector3& wi, const Vector3& half) const;
-  // What Cycles' sampler shows of a light below the closure's horizon, which lamps there do not.
-  double below_horizon(const Vector3& wi, const Vector3& half) const;
   // G alone, also for a light between the closure's own horizon and that of the surface.
   double visible(const Vector3& wi) const;
 
