@@ -26,13 +26,18 @@ def linear_light(image: bpy.types.Image) -> Any:
     )
 
 
+def for_blender(picture: np.ndarray) -> np.ndarray:
+    """The picture with its rows from below, as Blender wants it, and how opaque each pixel is."""
+    pixels = np.ones((*picture.shape[:2], 4), np.float32)
+    pixels[..., : picture.shape[2]] = picture[::-1]
+    return pixels
+
+
 def new_data_image(name: str, values: np.ndarray) -> bpy.types.Image:
     """A new floating-point image of data (rows, columns, 3), packed into the file."""
     rows, columns = values.shape[:2]
     image = bpy.data.images.new(name, columns, rows, float_buffer=True, is_data=True)
-    pixels = np.ones((rows, columns, 4), np.float32)
-    pixels[..., :3] = values[::-1]
-    image.pixels.foreach_set(pixels.ravel())
+    image.pixels.foreach_set(for_blender(values).ravel())
     image.update()
     image.pack()
     return image

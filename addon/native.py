@@ -4,7 +4,9 @@ import functools
 import importlib
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 _HERE = Path(__file__).parent
 
@@ -34,6 +36,19 @@ def problem() -> str:
                 "Lobefit and install it again."
             )
     return ""
+
+
+def needed(execute: Callable[[Any, Any], set[str]]) -> Callable[[Any, Any], set[str]]:
+    """Makes an operator's `execute` only report what keeps the module from being used, if so."""
+
+    @functools.wraps(execute)
+    def checked(self: Any, context: Any) -> set[str]:
+        if problem():
+            self.report({"ERROR"}, problem())
+            return {"CANCELLED"}
+        return execute(self, context)
+
+    return checked
 
 
 def own_identity() -> dict[str, str]:

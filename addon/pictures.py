@@ -42,11 +42,13 @@ def keep(
 
     `place` names the part of the panel that shows them.
     """
+    from .images import for_blender
+
     for title, picture in pictures.items():
         key = _key(material, place, title)
         icon = _icons[key] if key in _icons else _icons.new(key)
         icon.image_size = picture.shape[1], picture.shape[0]
-        icon.image_pixels_float.foreach_set(_for_blender(picture).ravel())
+        icon.image_pixels_float.foreach_set(for_blender(picture).ravel())
     _kept[material.session_uid, place] = Drawn(pictures, stamp(material), caption)
 
 
@@ -64,7 +66,9 @@ def as_image(drawn: Drawn) -> bpy.types.Image:
     """The pictures side by side as an image of the file, which takes the place of an older one."""
     import numpy as np
 
-    pixels = _for_blender(np.concatenate(list(drawn.pictures.values()), axis=1))
+    from .images import for_blender
+
+    pixels = for_blender(np.concatenate(list(drawn.pictures.values()), axis=1))
     rows, columns = pixels.shape[:2]
     image = bpy.data.images.get(IMAGE) or bpy.data.images.new(IMAGE, columns, rows)
     if tuple(image.size) != (columns, rows):
@@ -96,15 +100,6 @@ def register() -> None:
 def unregister() -> None:
     bpy.utils.previews.remove(_icons)
     _kept.clear()
-
-
-def _for_blender(picture: "np.ndarray") -> "np.ndarray":
-    """The picture with its rows from below, as Blender wants it, and how opaque each pixel is."""
-    import numpy as np
-
-    pixels = np.ones((*picture.shape[:2], 4), np.float32)
-    pixels[..., : picture.shape[2]] = picture[::-1]
-    return pixels
 
 
 def _key(material: bpy.types.Material, place: str, title: str) -> str:

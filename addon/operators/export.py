@@ -57,10 +57,8 @@ class LOBEFIT_OT_export_measured(RunsWork, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         kinds = [f"--{kind}" for kind in _KINDS if getattr(self, kind)]
         if not self.directory or not kinds:
             return self.refuse("Expected a folder and what to write to it, found none chosen.")

@@ -7,6 +7,7 @@ from typing import ClassVar
 import bpy
 from bpy.props import StringProperty
 
+from .. import native
 from ..jobs import Outcome
 from ..locks import lock_of
 from ..nodes.material import fill_material
@@ -52,6 +53,7 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
         material = active_material(context)
         source = record_of(material)["source"]

@@ -14,6 +14,7 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper
 
+from .. import native
 from ..jobs import Outcome
 from ..nodes.material import build_material, discard
 from ..picking import slot_under
@@ -133,6 +134,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
         self.place = "SLOT" if slot else "NONE"
         self._aimed = SlotTarget(*slot) if slot else None
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
         paths = self.chosen()
         if not paths:

@@ -44,10 +44,8 @@ class LOBEFIT_OT_set_kind(KindOptions, RunsWork, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context)
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         import lobefit
 
         take_preferred(self)

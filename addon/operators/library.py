@@ -44,10 +44,8 @@ class LOBEFIT_OT_make_library(LibraryOptions, RunsWork, bpy.types.Operator, Choo
         description="Show the folder of the library in every Asset Browser",
     )
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         from ..child import Child
 
         # Where no file was chosen, the folder was.

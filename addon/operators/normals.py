@@ -122,10 +122,8 @@ node, and heights for displacement. The file of lights says which images belong 
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         import lobefit
 
         try:

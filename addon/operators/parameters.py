@@ -4,35 +4,19 @@ from typing import ClassVar
 
 import bpy
 
-from .. import native
 from ..nodes.material import fill_material
 from ..parameters import is_edited, reset
 from ..records import COUNT_KEY, KEY, KIND_KEY, active_material, has_bounces, record_of
-from .polls import poll_changeable, poll_measured
+from .at_once import ActsAtOnce
+from .polls import poll_changeable
 
 
-class _EditsMaterial:
+class _EditsMaterial(ActsAtOnce):
     """What operators have in common that change the active measured material at once."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_measured(cls, context) and poll_changeable(cls, [active_material(context)])
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            self.report({"ERROR"}, problem)
-            return {"CANCELLED"}
-        import lobefit
-
-        material = active_material(context)
-        try:
-            record = lobefit.Record.from_json(material[KEY], material.name)
-            self.change(material, record)
-        except (lobefit.InputError, ValueError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        return super().poll(context) and poll_changeable(cls, [active_material(context)])
 
 
 class LOBEFIT_OT_edit_parameters(_EditsMaterial, bpy.types.Operator):
@@ -51,8 +35,11 @@ class LOBEFIT_OT_edit_parameters(_EditsMaterial, bpy.types.Operator):
             return False
         return True
 
-    def change(self, material: bpy.types.Material, record: object) -> None:
-        fill_material(material, record, "live")
+    def act(self, material: bpy.types.Material) -> str:
+        import lobefit
+
+        fill_material(material, lobefit.Record.from_json(material[KEY], material.name), "live")
+        return ""
 
 
 class LOBEFIT_OT_reset_parameters(_EditsMaterial, bpy.types.Operator):
@@ -72,9 +59,13 @@ class LOBEFIT_OT_reset_parameters(_EditsMaterial, bpy.types.Operator):
             return False
         return True
 
-    def change(self, material: bpy.types.Material, record: object) -> None:
+    def act(self, material: bpy.types.Material) -> str:
+        import lobefit
+
+        record = lobefit.Record.from_json(material[KEY], material.name)
         kind = material.get(KIND_KEY, "live")
         if not reset(material, record_of(material), kind):
             # Its nodes are no longer those of the record.
             count = material.get(COUNT_KEY) if kind in ("lobe", "measured") else None
             fill_material(material, record, kind, count, diffuse_bounces=has_bounces(material))
+        return ""

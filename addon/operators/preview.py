@@ -10,6 +10,7 @@ from .. import native, pictures
 from ..nodes.material import shown_by
 from ..parameters import edited_shown, is_edited
 from ..records import KEY, active_material, located, record_of
+from .at_once import ActsAtOnce
 from .polls import poll_measured
 from .run import RunsWork
 
@@ -78,31 +79,7 @@ def measured(material: bpy.types.Material) -> tuple[Any, Any]:
     return record, preview.measurement_of(record)
 
 
-class _Draws:
-    """What operators have in common that draw the active material without rendering."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_measured(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            self.report({"ERROR"}, problem)
-            return {"CANCELLED"}
-        import lobefit
-
-        try:
-            missing = self.draw_picture(active_material(context))
-        except lobefit.InputError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        if missing:
-            self.report({"WARNING"}, missing)
-        return {"FINISHED"}
-
-
-class LOBEFIT_OT_preview(_Draws, bpy.types.Operator):
+class LOBEFIT_OT_preview(ActsAtOnce, bpy.types.Operator):
     """Draw a sphere under two lights: measured, as Cycles will show it, and their difference"""
 
     bl_idname = "lobefit.preview"
@@ -113,11 +90,11 @@ class LOBEFIT_OT_preview(_Draws, bpy.types.Operator):
         name="Size", default=_SIZE, min=16, max=1024, description="Width of a sphere in pixels"
     )
 
-    def draw_picture(self, material: bpy.types.Material) -> str:
+    def act(self, material: bpy.types.Material) -> str:
         return draw_spheres(material, size=self.size)
 
 
-class LOBEFIT_OT_draw_chart(_Draws, bpy.types.Operator):
+class LOBEFIT_OT_draw_chart(ActsAtOnce, bpy.types.Operator):
     """Draw where the active material is off, its lobe, or how much light it reflects"""
 
     bl_idname = "lobefit.draw_chart"
@@ -135,7 +112,7 @@ class LOBEFIT_OT_draw_chart(_Draws, bpy.types.Operator):
         description="Degrees between the normal and the light, for the chart Lobe",
     )
 
-    def draw_picture(self, material: bpy.types.Material) -> str:
+    def act(self, material: bpy.types.Material) -> str:
         from lobefit import charts
 
         record, measurement = measured(material)
@@ -171,10 +148,8 @@ class LOBEFIT_OT_render_preview(RunsWork, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context)
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         import tempfile
 
         from lobefit.preview import FINER_AT_ONCE

@@ -6,7 +6,6 @@ from typing import Any, Protocol
 
 import bpy
 
-from .. import native
 from ..jobs import Batch, Outcome
 from ..nodes.material import choose
 from ..properties import FitOptions
@@ -179,9 +178,6 @@ class RunsFits(FitOptions, RunsWork):
 
     def fit(self, context: bpy.types.Context, paths: Sequence[str]) -> set[str]:
         """Fits the files."""
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         return self.start(context, Batch(paths, self.fit_options()))
 
     def conclude_in_steps(self, context: bpy.types.Context, work: Batch) -> Conclusion:

@@ -24,10 +24,8 @@ class LOBEFIT_OT_simplify_scene(SimplifyOptions, RunsWork, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context)
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            return self.refuse(problem)
         from ..survey import Survey
 
         survey = Survey(context, self.frames)
@@ -73,11 +71,8 @@ class LOBEFIT_OT_restore_scene(bpy.types.Operator):
             cls.poll_message_set("Lobefit is at work: wait for it or cancel it")
         return current() is None
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            self.report({"ERROR"}, problem)
-            return {"CANCELLED"}
         from ..simplification import restore_all
 
         result = restore_all()

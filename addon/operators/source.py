@@ -1,8 +1,9 @@
 """Finds the measured file of a material again that is no longer where it was."""
 
+import itertools
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -50,7 +51,7 @@ class LOBEFIT_OT_relink(bpy.types.Operator):
         """Asks for the file, where it is not in the folder that the preferences tell."""
         wanted = record_of(active_material(context))["source"]
         if native.problem() == "" and not self.filepath:
-            found = (_find(Path(folder), wanted) for folder in measured_folders())
+            found = (_find(_files_below(Path(folder)), wanted) for folder in measured_folders())
             self.filepath = next(filter(None, found), "")
         if self.filepath:
             return self.execute(context)
@@ -58,16 +59,14 @@ class LOBEFIT_OT_relink(bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            self.report({"ERROR"}, problem)
-            return {"CANCELLED"}
         place = Path(bpy.path.abspath(self.filepath))
         material = active_material(context)
         source = record_of(material)["source"]
         if place.is_dir():
-            path, expected = _find(place, source), "the measured file of the record in or below it"
+            path = _find(_files_below(place), source)
+            expected = "the measured file of the record in or below it"
         else:
             path, expected = str(place), "the file that was fitted"
         if not self.filepath or not path or not Path(path).exists():
@@ -91,34 +90,30 @@ class LOBEFIT_OT_relink(bpy.types.Operator):
 
 def _link_others(material: bpy.types.Material, folder: Path) -> list[bpy.types.Material]:
     """Tells the other materials whose files are not found where theirs are now."""
-    linked = []
+    linked, files = [], _files_below(folder)
     for other in bpy.data.materials:
         record = None if other == material or lock_of(other) else record_of(other)
         if record is not None and not source_file(record["source"]):
-            path = _find(folder, record["source"])
+            path = _find(files, record["source"])
             if path:
                 _set_path(other, path)
                 linked.append(other)
     return linked
 
 
-def _find(folder: Path, source: dict) -> str:
-    """The file of a record in or below a folder, by its name and its bytes; empty if none is."""
-    name = Path(source["path"] or "").name
-    if not name:
-        return ""
-    places = (place for place in _files_below(folder) if Path(place).name == name)
+def _find(files: Mapping[str, Sequence[str]], source: dict) -> str:
+    """The file of a record among `files`, by its name and its bytes; empty if none is."""
+    places = files.get(Path(source["path"] or "").name, ())
     return next((place for place in places if _is_file_of(place, source)), "")
 
 
-def _files_below(folder: Path) -> Iterator[str]:
-    count = 0
-    for place, _, names in os.walk(folder):
-        for name in names:
-            count += 1
-            if count > _MOST_FILES:
-                return
-            yield str(Path(place) / name)
+def _files_below(folder: Path) -> dict[str, list[str]]:
+    """Where files are, in a folder and below it, by their names."""
+    places: dict[str, list[str]] = {}
+    found = (Path(place, name) for place, _, names in os.walk(folder) for name in names)
+    for path in itertools.islice(found, _MOST_FILES):
+        places.setdefault(path.name, []).append(str(path))
+    return places
 
 
 def _is_file_of(path: str, source: dict) -> bool:

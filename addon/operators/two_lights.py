@@ -169,11 +169,12 @@ def _put_beside(
 def _image(name: str, light: "np.ndarray") -> bpy.types.Image:
     import numpy as np
 
+    from ..images import for_blender
+
     size = len(light)
     place = (np.arange(size) + 0.5) * 2 / size - 1
-    pixels = np.empty((size, size, 4), np.float32)
-    pixels[..., :3] = np.nan_to_num(light[::-1])
-    pixels[..., 3] = np.hypot(place, place[:, None]) < 1
+    cover = np.hypot(place, place[:, None]) < 1
+    pixels = for_blender(np.dstack([np.nan_to_num(light), cover]))
     image = bpy.data.images.new(name, size, size, alpha=True, float_buffer=True, is_data=True)
     image.pixels.foreach_set(pixels.ravel())
     image.pack()

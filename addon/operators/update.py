@@ -27,11 +27,8 @@ what is linked from other files is named and left as it is"""
             return False
         return poll_changeable(cls, found)
 
+    @native.needed
     def execute(self, context: bpy.types.Context) -> set[str]:
-        problem = native.problem()
-        if problem:
-            self.report({"ERROR"}, problem)
-            return {"CANCELLED"}
         import lobefit
 
         updated, problems = [], []

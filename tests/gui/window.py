@@ -38,8 +38,10 @@ class Window:
         self.clicks = 0
         self._tool = os.environ["LOBEFIT_GUI_BLENDER"]
         self._root = Path(os.environ["LOBEFIT_GUI_FOLDER"])
-        self.folder, self.inside = self._root / "work" / "lobefit", Path("/work/lobefit")
+        # The folder is the root of what Blender sees.
+        self.folder, self.inside = self._root / "lobefit", Path("/", "lobefit")
         self.downloads = self.folder / "downloads"
+        self.downloads_inside = str(self.inside / "downloads")
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
         shutil.copy(HERE / "driver.py", self.folder)
