@@ -33,15 +33,6 @@ watched = bpy.app.driver_namespace['watched']
 watched['on'] = False
 result = watched['clock'], watched['own']
 """
-IMPORT = """
-window = bpy.context.window_manager.windows[0]
-area = next(a for a in window.screen.areas if a.type == 'VIEW_3D')
-region = next(r for r in area.regions if r.type == 'WINDOW')
-with bpy.context.temp_override(window=window, area=area, region=region):
-    bpy.ops.lobefit.import_measured(
-        'INVOKE_DEFAULT', directory={directory!r}, files=[{{'name': {name!r}}}]
-    )
-"""
 IDLE = "__import__('sys').modules['bl_ext.user_default.lobefit.operators.run'].current() is None"
 
 
@@ -67,7 +58,7 @@ def main(paths: list[Path]) -> None:
             shutil.copy(path, window.downloads)
             window.ask(WATCH)
             start = time.monotonic()
-            window.ask(IMPORT.format(directory=window.downloads_inside, name=path.name))
+            window.drop(path.name)
             window.wait_for(IDLE)
             tell(path.stem, window, time.monotonic() - start)
     finally:

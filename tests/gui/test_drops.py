@@ -71,9 +71,8 @@ def test_beside_all_objects(shared, files, cube):
 
 
 def test_several_files(shared, files, cube):
-    shared.click(files.place("nickel.binary"))
-    shared.click_too(files.place("violet-rubber.binary"))
-    shared.drag(files.place("violet-rubber.binary"), cube)
+    shared.move(cube)
+    shared.drop("nickel.binary", "violet-rubber.binary")
     state = settled(shared)
     shared.shot("several_files")
     assert state == {"kept": ["nickel", "violet-rubber"], "slots": ["Material"]}

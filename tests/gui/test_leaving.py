@@ -5,17 +5,7 @@ import time
 import pytest
 from window import PATIENCE
 
-# Starts an import of both files in the viewport, as a drop of them does.
-IMPORT = """
-window = bpy.context.window_manager.windows[0]
-area = next(a for a in window.screen.areas if a.type == 'VIEW_3D')
-region = next(r for r in area.regions if r.type == 'WINDOW')
-files = [{{'name': 'nickel.binary'}}, {{'name': 'violet-rubber.binary'}}]
-with bpy.context.temp_override(window=window, area=area, region=region):
-    result = list(bpy.ops.lobefit.import_measured(
-        'INVOKE_DEFAULT', directory={directory!r}, files=files
-    ))
-"""
+FILES = ("nickel.binary", "violet-rubber.binary")
 STATE = """
 import os
 import sys
@@ -32,10 +22,10 @@ result = {
 @pytest.fixture
 def begun(shared):
     """The window with an import under way, and how things stood before."""
-    begin = IMPORT.format(directory=shared.downloads_inside)
     # The first one also starts what Blender keeps, as the threads of its own scheduler.
     if not shared.ask("result = bpy.app.driver_namespace.get('warm', False)"):
-        shared.ask(begin + "bpy.app.driver_namespace['warm'] = True")
+        shared.drop(*FILES)
+        shared.ask("bpy.app.driver_namespace['warm'] = result = True")
         while shared.ask(STATE)["running"]:
             pass
         shared.key("Escape")
@@ -47,7 +37,7 @@ def begun(shared):
     shared.move((600, 400))
     before = shared.ask(STATE)
     assert not before["running"]
-    assert shared.ask(begin) == ["RUNNING_MODAL"]
+    assert shared.drop(*FILES) == ["RUNNING_MODAL"]
     assert shared.ask(STATE)["running"]
     return shared, before
 

@@ -14,6 +14,18 @@ DISPLAY = os.environ.get("LOBEFIT_DISPLAY", ":77")
 HEIGHT = 1000  # pixels of the display; Blender counts them from below
 PATIENCE = 120  # seconds after which what should have happened never will
 
+# Hands files of the downloads to the viewport, as the system does when they are dropped there;
+# Blender's own File Browser drags one file at a time.
+_DROP = """
+window = bpy.context.window_manager.windows[0]
+area = next(a for a in window.screen.areas if a.type == 'VIEW_3D')
+region = next(r for r in area.regions if r.type == 'WINDOW')
+with bpy.context.temp_override(window=window, area=area, region=region):
+    result = list(bpy.ops.lobefit.import_measured(
+        'INVOKE_DEFAULT', directory={directory!r}, files={files!r}
+    ))
+"""
+
 Place = tuple[float, float]
 
 
@@ -41,7 +53,6 @@ class Window:
         # The folder is the root of what Blender sees.
         self.folder, self.inside = self._root / "lobefit", Path("/", "lobefit")
         self.downloads = self.folder / "downloads"
-        self.downloads_inside = str(self.inside / "downloads")
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
         shutil.copy(HERE / "driver.py", self.folder)
@@ -109,6 +120,11 @@ class Window:
         )
         return x, HEIGHT - y - height, width, height
 
+    def drop(self, *names: str) -> list[str]:
+        """Drops files of the downloads on the viewport; what the operator returns."""
+        files = [{"name": name} for name in names]
+        return self.ask(_DROP.format(directory=str(self.inside / "downloads"), files=files))
+
     def move(self, place: Place) -> None:
         """Moves the mouse there."""
         self._xdotool("mousemove", *(str(round(number)) for number in place))
@@ -119,13 +135,6 @@ class Window:
         self.clicks += 1
         self.move(place)
         self._xdotool("click", "--repeat", str(times), "--delay", "80", "1")
-        self._settle()
-
-    def click_too(self, place: Place) -> None:
-        """Clicks as one does to have two things selected."""
-        self._xdotool("keydown", "ctrl")
-        self.click(place)
-        self._xdotool("keyup", "ctrl")
         self._settle()
 
     def drag(self, start: Place, end: Place, picture: str = "") -> None:
