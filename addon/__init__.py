@@ -4,6 +4,8 @@ The wheel carries the same folder as the package `lobefit_addon`, which builds m
 being registered: `lobefit_addon.build_material(record)`.
 """
 
+import bpy
+
 from . import cli, native, operators, panels, preferences
 from .nodes.material import build_material
 
@@ -17,11 +19,20 @@ def register() -> None:
     panels.register()
     preferences.register()
     cli.register()
+    # Soon after Blender's start, so that no panel has to load it while it is drawn (records.embed).
+    bpy.app.timers.register(_load)
 
 
 def unregister() -> None:
     """Removes all of it, and ends a fit that is under way."""
+    if bpy.app.timers.is_registered(_load):
+        bpy.app.timers.unregister(_load)
     cli.unregister()
     preferences.unregister()
     panels.unregister()
     operators.unregister()
+
+
+def _load() -> None:
+    """Loads the compiled module, or finds out what keeps it from being used."""
+    native.problem()

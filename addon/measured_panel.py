@@ -179,7 +179,7 @@ def _energy(albedo: dict[str, list[Any]]) -> str:
     """Says where more light is reflected than arrives; empty where that is nowhere."""
     if native.problem():
         return ""
-    from lobefit.shown import excess
+    from lobefit.albedo import excess
 
     return excess(albedo["view_angle"], albedo["measured"], albedo["shown"])
 

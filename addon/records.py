@@ -78,6 +78,17 @@ def record_of(material: bpy.types.Material | None) -> dict[str, Any] | None:
     return None if damage_of(material) else entries
 
 
+def embed(material: bpy.types.Material, record: Any) -> None:
+    """Puts a `lobefit.Record` into a material.
+
+    It is checked here, where there is time, and not when its panel is first drawn: from 5 ms on
+    Python lets a thread in that renders a preview, and Blender may then refuse for good what
+    timers write ("Writing to ID classes in this context is not allowed").
+    """
+    material[KEY] = record.to_json()
+    damage_of(material)
+
+
 def damage_of(material: bpy.types.Material) -> str:
     """What is wrong with the record in a material, in a sentence; wants the compiled module."""
     return _damage(material[KEY], material.name)

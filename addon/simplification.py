@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .locks import problem_of
-from .records import KEY, RESULT_KEY, has_bounces, is_simplified
+from .records import KEY, RESULT_KEY, embed, has_bounces, is_simplified
 from .scene import render_seconds
 from .scene_budget import BOUNCE_TOLERANCE, Decision, Subject, choose_ways
 from .scene_view import lights, shown_only_in_renders
@@ -143,7 +143,7 @@ def _change(decision: Decision, diffuse_bounces: bool) -> dict[str, bool]:
         show(subject.material, subject.record, subject.now, way, bounces)
     else:
         # Closures that were found on the way are kept for the next time.
-        subject.material[KEY] = subject.record.to_json()
+        embed(subject.material, subject.record)
     return {"changed": changed, "diffuse_bounces": bounces}
 
 

@@ -6,7 +6,16 @@ from typing import Any
 
 import bpy
 
-from ..records import BEFORE_KEY, BOUNCES_KEY, COUNT_KEY, KEY, KIND_KEY, VERSION, VERSION_KEY
+from ..records import (
+    BEFORE_KEY,
+    BOUNCES_KEY,
+    COUNT_KEY,
+    KEY,
+    KIND_KEY,
+    VERSION,
+    VERSION_KEY,
+    embed,
+)
 from .baked import baked_group
 from .live import live_group, live_inputs
 from .principled import principled_node
@@ -223,7 +232,7 @@ def _fill(material: bpy.types.Material, record: Any, choice: Choice, diffuse_bou
         if diffuse_bounces:
             shader = _add_bounces(tree, f"{material.name} bounces", record, shader)
         _add_output(tree, "CYCLES", shader, (500.0, 300.0))
-    material[KEY] = record.to_json()
+    embed(material, record)
     material[KIND_KEY], material[COUNT_KEY] = choice.kind, choice.count
     material[VERSION_KEY] = VERSION
     material[BOUNCES_KEY] = diffuse_bounces and shader is not None

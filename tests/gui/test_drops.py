@@ -109,7 +109,9 @@ def test_on_the_shader_editor(shared, files, cube):
         "area = next(a for a in areas if a.type == 'NODE_EDITOR')\n"
         "region = next(r for r in area.regions if r.type == 'WINDOW')\n"
         f"x, y = {place[0]} - region.x, {HEIGHT - place[1]} - region.y\n"
-        "result = [list(node.location), list(region.view2d.region_to_view(x, y))]"
+        "scale = bpy.context.preferences.system.ui_scale\n"
+        "seen = [place / scale for place in region.view2d.region_to_view(x, y)]\n"
+        "result = [list(node.location), seen]"
     )
-    # The mouse is at whole pixels, and a node's size goes with that of the interface.
+    # The mouse is at whole pixels.
     assert found == pytest.approx(expected, abs=5)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from lobefit import Measurement, _native, charts, closures, preview
 from lobefit._native import InputError
+from lobefit.albedo import excess
 from lobefit.plot import Line, plot
 from lobefit.plot_image import drawn
-from lobefit.shown import evaluate, excess, reflectance
+from lobefit.shown import evaluate, reflectance
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 

@@ -36,6 +36,7 @@ from lobefit import (
     simplified,
 )
 from lobefit._native import Cancelled, InputError
+from lobefit.albedo import excess
 from lobefit.atomic import make_folder, place_to_write, reason, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
 from lobefit.classic import LEAST_EXPONENT, match_exponent
@@ -54,7 +55,6 @@ from lobefit.lights import in_order, read_lights
 from lobefit.origin import origin_of, write_samples
 from lobefit.phong_energy import LOBES, MOST_EXPONENT, energy
 from lobefit.record import MODELS, NORMS, SCHEDULES, VISUAL_NORM, Fit, Record
-from lobefit.shown import excess
 
 DONE, SOME_FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
