@@ -727,10 +727,19 @@ py::dict fit_naively_by(const SharedMeasurement& measurement, const py::dict& st
 
 template <typename Owner>
 void bind_job_methods(py::class_<Owner>& bound, auto job_of) {
-  bound.def_property_readonly("progress", [=](Owner& o) { return job_of(o).progress(); })
-      .def_property_readonly("stage", [=](Owner& o) { return job_of(o).stage(); })
-      .def_property_readonly("done", [=](Owner& o) { return job_of(o).done(); })
-      .def("cancel", [=](Owner& o) { job_of(o).cancel(); })
+  bound
+      .def_property_readonly(
+          "progress", [=](Owner& o) { return job_of(o).progress(); },
+          "The share that is done, from 0 to 1.")
+      .def_property_readonly(
+          "stage", [=](Owner& o) { return job_of(o).stage(); },
+          "What is being done, in a word or two.")
+      .def_property_readonly(
+          "done", [=](Owner& o) { return job_of(o).done(); },
+          "Whether `result` would answer at once.")
+      .def(
+          "cancel", [=](Owner& o) { job_of(o).cancel(); },
+          "Asks the job to end soon; `result` then raises Cancelled.")
       .def(
           "wait",
           [=](Owner& o, double seconds) {
@@ -759,8 +768,13 @@ void bind_measurement(py::module_& module) {
                   "A table of shape (3, 90, 90, 180) in 1/sr; negative or not finite is invalid.")
       .def_property_readonly("values", &values_of,
                              "(3, 90, 90, 180) in 1/sr, NaN where invalid; read-only.")
-      .def_property_readonly("bins", [](const Measurement& m) { return to_dict(m.bins()); })
-      .def_property_readonly("format", [](const Measurement& m) { return m.source().format; })
+      .def_property_readonly(
+          "bins", [](const Measurement& m) { return to_dict(m.bins()); },
+          "How many bins are `valid`, and how many are not because they are `below_horizon`, "
+          "`negative` or `non_finite`.")
+      .def_property_readonly(
+          "format", [](const Measurement& m) { return m.source().format; },
+          "The format of the file, MERL or RGL; MERL where there was no file.")
       .def_property_readonly(
           "warnings", [](const Measurement& m) { return m.source().warnings; },
           "What a user should know of how the file was read.")
@@ -788,7 +802,9 @@ void bind_rgl(py::module_& module) {
              return std::make_shared<Rgl>(InputFile(path));
            }),
            py::arg("path"), "Reads a file; InputError says what is wrong with it.")
-      .def_property_readonly("isotropic", &Rgl::isotropic)
+      .def_property_readonly(
+          "isotropic", &Rgl::isotropic,
+          "Whether the file tells nothing of turning: it has one or two azimuths of the light.")
       .def(
           "evaluate",
           [](const std::shared_ptr<Rgl>& rgl, const DirectionArray& wi, const DirectionArray& wo) {
@@ -875,15 +891,20 @@ void bind_methods(py::module_& module) {
 }
 
 void bind_errors(py::module_& module) {
-  py::register_exception<InputError>(module, "InputError", PyExc_ValueError);
-  py::register_exception<Cancelled>(module, "Cancelled");
+  py::register_exception<InputError>(module, "InputError", PyExc_ValueError).attr("__doc__") =
+      "A file or an argument is not as expected; one sentence says what was found in its place.";
+  py::register_exception<Cancelled>(module, "Cancelled").attr("__doc__") =
+      "What was under way was asked to end, and did.";
 }
 
 void bind_functions(py::module_& module) {
-  module.def("sample_names", [] {
-    const auto names = sample_names();
-    return std::vector<std::string>(names.begin(), names.end());
-  });
+  module.def(
+      "sample_names",
+      [] {
+        const auto names = sample_names();
+        return std::vector<std::string>(names.begin(), names.end());
+      },
+      "The names of the sample measurements.");
   module.def(
       "sample",
       [](const std::string& name) {

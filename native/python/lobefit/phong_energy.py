@@ -34,6 +34,7 @@ class Energy:
 
     @property
     def normalising(self) -> Any:
+        """What times the lobe reflects all light at this angle."""
         return 1 / self.integral
 
 
