@@ -161,6 +161,10 @@ def _put_beside(
     mesh.materials.append(_picture_material(image))
     plane = bpy.data.objects.new("Measured", mesh)
     plane.location = (-_APART, 0, 0)
+    # It is for the camera: its light, which is brightest in the highlights, is not to fall on what
+    # stands beside it.
+    for ray in ("diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+        setattr(plane, f"visible_{ray}", False)
     scene.collection.objects.link(plane)
     scene.camera.data.ortho_scale = 4 * _APART
     scene.render.resolution_x = 2 * scene.render.resolution_y

@@ -500,6 +500,9 @@ def test_scene_with_two_lights(addon, on_a_cube, two_lights, subject):
     if subject == "SPHERE":
         ours = picture[:, 64:]
         assert ours[lit, lit].sum() == pytest.approx(expected[lit, lit].sum(), rel=0.15)
+        # What stands beside it is seen by the camera alone, and throws no light on it.
+        bpy.data.objects.remove(scene.objects["Measured"])
+        assert np.array_equal(ours, two_lights.render_pixels(scene)[:, 64:])
 
 
 def test_scene_without_the_measurement(addon):
