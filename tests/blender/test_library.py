@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import EXTENSION
 from lobefit import picture, preview
+from lobefit.command_line import main
 
 PATIENCE = 60  # seconds after which what should have happened never will
 
@@ -245,3 +246,17 @@ def test_another_blender_that_is_lost_is_noticed(child):
     while not child.advance(0.1):
         assert time.monotonic() < end
     assert child.problems == ["The Blender that was at work ended early (exit code -9)."]
+
+
+def test_a_command_leaves_the_preferences_alone(addon, folder, tmp_path):
+    # Blender deletes the modules of all extensions that are not enabled, as none is where it reads
+    # its factory settings; this Blender and the one that a command runs in have the same ones.
+    record = str(folder / "Polished" / "nickel.json")
+    for words in (
+        ["material", record, "--closures", "1", "-o", str(tmp_path / "a.blend")],
+        ["library", record, "--closures", "1", "-o", str(tmp_path / "b.blend")],
+        ["export", str(tmp_path / "a.blend"), "--usd", "-o", str(tmp_path / "out")],
+    ):
+        assert main(words) == 0
+        assert addon.__name__ in bpy.context.preferences.addons
+        assert Path(lobefit.__file__).is_file()

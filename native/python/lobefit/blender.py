@@ -88,12 +88,11 @@ def write_library(
     written.
     """
     catalogues = Catalogues(place_to_write(path).parent)
-    import bpy
     from lobefit_addon.assets import missing_assets, oldest_release
     from lobefit_addon.records import KEY
 
     with quiet():
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        _empty_file()
     made = []
     for index, (record, asset) in enumerate(contents):
         if progress:
@@ -168,14 +167,13 @@ def costs(record: Record) -> dict[tuple[str, int | None], float]:
     of it. ("diffuse", None) is a plain diffuse surface. Measured under a constant world, which lets
     Cycles both evaluate and sample each closure.
     """
-    import bpy
     from lobefit_addon import build_material
     from lobefit_addon.cost import diffuse_material, measure_costs
 
     ways = [("live", None), ("principled", None)]
     ways += [(entry["target"], entry["count"]) for entry in record.closures if entry["count"]]
     with quiet():
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        _empty_file()
         materials = {("diffuse", None): diffuse_material()}
         for kind, count in ways:
             materials[kind, count] = build_material(record, kind=kind, count=count)
@@ -202,7 +200,7 @@ def export_principled(path: str | os.PathLike[str], name: str, record: Record) -
     from lobefit_addon.scene import sphere_mesh
 
     with quiet():
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        _empty_file()
         mesh = sphere_mesh(build_material(record, "principled", name), subdivisions=5)
         bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
     with written_aside(path) as aside, quiet():
@@ -297,6 +295,17 @@ def restore(path: str | os.PathLike[str], output: str | os.PathLike[str] | None)
     return result
 
 
+def _empty_file() -> None:
+    """A new file without data.
+
+    Factory settings would have no extension enabled, and Blender then deletes the modules of all:
+    those that the user's own Blender has loaded a part of.
+    """
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+
+
 def _open(path: str | os.PathLike[str]) -> None:
     if not Path(path).is_file():
         raise InputError(f"{path}: expected a Blender file, found no such file.")
@@ -325,12 +334,11 @@ def _one_line(error: RuntimeError) -> str:
 
 def _two_lights_scene(record: Record, size: int, kind: str, **options: Any) -> Any:
     """An otherwise empty Blender whose scene shows the material, `size` pixels wide."""
-    import bpy
     from lobefit_addon import build_material
     from lobefit_addon.scene import two_lights_scene
 
     with quiet():
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        _empty_file()
         material = build_material(record, kind, record.name, **options)
         material.use_fake_user = True
         return two_lights_scene(material, size)
