@@ -7,9 +7,9 @@ being registered: `lobefit_addon.build_material(record)`.
 import bpy
 
 from . import cli, native, operators, panels, preferences
-from .nodes.material import build_material
+from .nodes.material import add_to_tree, build_material, fill_material
 
-__all__ = ["build_material", "register", "unregister"]
+__all__ = ["add_to_tree", "build_material", "fill_material", "register", "unregister"]
 
 
 def register() -> None:
