@@ -32,6 +32,7 @@ _PLATFORMS = {
 }
 _OWN_PLATFORM = {"x86_64": "linux-x64", "aarch64": "linux-arm64"}[machine()]
 
+_INDEX = "index.md"
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>{title}</title>
 <style>
@@ -40,6 +41,7 @@ body {{ font: 16px/1.55 system-ui, sans-serif; max-width: 46rem; margin: 2rem au
 img {{ max-width: 100% }} table {{ border-collapse: collapse }}
 td, th {{ padding: .25rem .8rem .25rem 0; text-align: left; border-bottom: 1px solid #8884 }}
 </style>
+{way_back}
 {body}
 </html>
 """
@@ -98,8 +100,11 @@ def write_manual(pages: Path, output: Path) -> None:
         text = page.read_text(encoding="utf-8")
         title = text.partition("\n")[0].removeprefix("# ")
         body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
-        body = re.sub(r'href="([\w-]+)\.md', r'href="\1.html', body)
-        html = _PAGE.format(title=title, body=body)
+        way_back = (
+            "" if page.name == _INDEX else f'<p><a href="{_INDEX}">Lobefit: the manual</a></p>'
+        )
+        html = _PAGE.format(title=title, body=body, way_back=way_back)
+        html = re.sub(r'href="([\w-]+)\.md', r'href="\1.html', html)
         (output / page.name).with_suffix(".html").write_text(html, encoding="utf-8")
 
 

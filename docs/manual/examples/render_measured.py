@@ -16,7 +16,7 @@ def main(measured: str, output: str) -> None:
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64)
     bpy.ops.object.shade_smooth()
-    # The material goes to the active object. An error ends the script with one sentence.
+    # The material goes to the active object. An error is raised: a RuntimeError with one sentence.
     bpy.ops.lobefit.import_measured(filepath=str(Path(measured).resolve()), kind="measured")
     print("made", bpy.context.object.active_material.name)
 
