@@ -75,12 +75,15 @@ def test_import_into_the_active_object(addon, measured_file):
     assert not cube.active_material.use_fake_user
 
 
-def test_several_files_of_which_one_is_bad(addon, measured_file, tmp_path):
+def test_several_files_of_which_one_is_bad(addon, measured_file, capfd):
     folder = Path(measured_file).parent
     (folder / "bad.binary").write_bytes(b"no measurement")
     names = [{"name": name} for name in ("bad.binary", Path(measured_file).name)]
     assert bpy.ops.lobefit.import_measured(directory=str(folder), files=names) == {"FINISHED"}
     assert len(bpy.data.materials) == 1
+    told = capfd.readouterr()[0]
+    assert "bad.binary: expected" in told
+    assert "% off, fitted in" in told and "1 of 2 files fitted" in told
 
 
 VALUES = 3 * 90 * 90 * 180
