@@ -26,7 +26,7 @@ def main(measured: str, output: str) -> None:
     scene = bpy.context.scene
     scene.camera = bpy.context.object
     scene.render.engine = "CYCLES"
-    scene.cycles.samples = 64
+    scene.cycles.samples, scene.cycles.use_denoising = 64, False
     scene.render.resolution_x = scene.render.resolution_y = 256
     scene.render.film_transparent = True
     scene.render.filepath = str(Path(output).resolve())
