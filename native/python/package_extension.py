@@ -38,7 +38,7 @@ _PAGE = """<!doctype html>
 <style>
 :root {{ color-scheme: light dark }}
 body {{ font: 16px/1.55 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 2% }}
-img {{ max-width: 100% }} table {{ border-collapse: collapse }}
+img {{ max-width: 100% }} pre {{ overflow-x: auto }} table {{ border-collapse: collapse }}
 td, th {{ padding: .25rem .8rem .25rem 0; text-align: left; border-bottom: 1px solid #8884 }}
 </style>
 {way_back}
