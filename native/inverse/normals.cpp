@@ -2,7 +2,6 @@
 
 #include "inverse/height.h"
 #include "inverse/level.h"
-#include "inverse/pixelwise.h"
 #include "inverse/reflectance_map.h"
 #include "inverse/relaxation.h"
 #include "measurement/parallel.h"
@@ -14,10 +13,10 @@ Normals estimate_normals(const Pictures& pictures, const Reflectance& f_times_co
   const int threads = thread_count(options.threads);
   monitor.report("reflectance", 0);
   const ReflectanceMap map(f_times_cosine, pictures.lighting, options.floor, threads, monitor);
-  const Level level = level_of(pictures, map);
+  const Level level = level_of(pictures, map, options.noise);
   const std::vector<Place> places = pictures.values.size() >= 3
-                                        ? estimate_pixelwise(map, level, threads, monitor)
-                                        : estimate_jointly(map, level, threads, monitor);
+                                        ? relaxed_from_pixels(map, level, threads, monitor)
+                                        : relaxed_from_silhouette(map, level, threads, monitor);
   Normals result{pictures.grid, std::vector<Vector3>(places.size(), Vector3::Zero()), {}};
   for (std::size_t pixel = 0; pixel < places.size(); ++pixel) {
     if (pictures.grid.mask[pixel]) result.normals[pixel] = normal_at(places[pixel]);

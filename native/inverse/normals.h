@@ -11,6 +11,7 @@ namespace lobefit {
 
 struct NormalsOptions {
   double floor = 1e-3;  // the value of a pixel under which noise rules, > 0
+  double noise = 0;     // its standard deviation
   int threads = 0;      // 0: every processor
 };
 
@@ -22,7 +23,8 @@ struct Normals {
 };
 
 // The normals that explain the pictures best, and the surface that has them. From three pictures on
-// every pixel is estimated by itself, from fewer all together, by way of the silhouette. The
+// a pixel's neighbours decide only where noise hides what it shows; from fewer all pixels are
+// estimated together, by way of the silhouette. The
 // reflectance is f cos(theta_i) and is called from several threads. The same for any number of
 // threads.
 Normals estimate_normals(const Pictures& pictures, const Reflectance& f_times_cosine,

@@ -35,11 +35,11 @@ bool PixelCost::operator()(const double* at, double* residuals, double* jacobian
 
   const double share = std::sqrt(1.0 / channels);
   for (int c = 0; c < channels; ++c) {
-    const float difference = observed_[c] - predicted[c];
-    const bool explained = observed_[c] >= saturated_ && difference < 0;
-    const Root root = explained ? Root{0, 0} : root_of(difference);
+    const Observed::Misfit misfit = observed_.misfit(c, predicted[c]);
+    const Root root = root_of(misfit.value);
     rest[c] = share * root.value;
-    if (jacobian) slopes.row(c) << -share * root.slope * by_u[c], -share * root.slope * by_v[c];
+    const double slope = share * root.slope * misfit.slope;
+    if (jacobian) slopes.row(c) << slope * by_u[c], slope * by_v[c];
   }
 
   const Vector3 normal = normal_at(seen);

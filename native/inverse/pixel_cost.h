@@ -2,30 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 
+#include "inverse/observed.h"
 #include "inverse/reflectance_map.h"
 #include "inverse/stereographic.h"
 
 namespace lobefit {
-
-// What a pixel shows in all pictures, compressed as in the reflectance map.
-using Observed = Eigen::Map<const Eigen::VectorXf>;
-
-// The penalty of one channel for r = observed - predicted, both compressed: L1, so that few
-// channels which the model does not explain, such as highlights that it shapes badly, do not bend
-// the others. What is darker than it should be may lie in another part's shadow: its penalty stays
-// below `darkness`. With a limit of 1 normals that turn away from two of six lights, for the sake
-// of shadows cast there, win over the true ones.
-struct Penalty {
-  // |r| is rounded off below a per cent of brightness, so that derivatives exist.
-  static constexpr float rounding = 0.01f;
-  static constexpr float darkness = 0.25f;
-
-  static float of(float r) {
-    const float size = std::sqrt(r * r + rounding * rounding) - rounding;
-    return r < 0 ? size / (1 + size / darkness) : size;
-  }
-};
 
 // Wishes of the surroundings; each adds weight |n - normal|^2 / 2 over the components it concerns.
 struct Prior {
@@ -42,17 +25,14 @@ class PixelCost {
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 2 };
 
-  // A channel observed at `saturated` or above was at least that bright.
-  PixelCost(const ReflectanceMap& map, float saturated, const float* observed,
-            const Prior& prior = {})
-      : map_(map), saturated_(saturated), observed_(observed, map.channels()), prior_(prior) {}
+  PixelCost(const ReflectanceMap& map, Observed observed, const Prior& prior = {})
+      : map_(map), observed_(std::move(observed)), prior_(prior) {}
 
   int NumResiduals() const { return map_.channels() + 5; }
   bool operator()(const double* place, double* residuals, double* jacobian) const;
 
  private:
   const ReflectanceMap& map_;
-  float saturated_;
   Observed observed_;
   Prior prior_;
 };

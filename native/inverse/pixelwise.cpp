@@ -31,12 +31,11 @@ class Lattice {
   }
 
   // Up to `most` places from which to look further, the best first: those that no neighbour beats.
-  std::vector<Place> starts(const float* observed, float saturated, std::size_t most) const {
+  std::vector<Place> starts(const Observed& observed, std::size_t most) const {
     thread_local std::vector<float> penalties;
     penalties.resize(places_.size());
     for (std::size_t i = 0; i < places_.size(); ++i) {
-      penalties[i] =
-          penalty(values_.data() + i * static_cast<std::size_t>(channels_), observed, saturated);
+      penalties[i] = penalty(values_.data() + i * static_cast<std::size_t>(channels_), observed);
     }
     std::vector<std::size_t> best;
     for (std::size_t i = 0; i < places_.size(); ++i) {
@@ -61,12 +60,9 @@ class Lattice {
   static constexpr int side = 33;
   static double coordinate(int i) { return (i - side / 2) * (2.0 / (side - 1)); }
 
-  float penalty(const float* predicted, const float* observed, float saturated) const {
+  float penalty(const float* predicted, const Observed& observed) const {
     float sum = 0;
-    for (int c = 0; c < channels_; ++c) {
-      const float r = observed[c] - predicted[c];
-      sum += observed[c] >= saturated && r < 0 ? 0 : Penalty::of(r);
-    }
+    for (int c = 0; c < channels_; ++c) sum += Penalty::of(observed.misfit(c, predicted[c]).value);
     return sum;
   }
 
@@ -98,14 +94,13 @@ constexpr std::size_t most_starts = 3;
 // A mean penalty of so little, a per cent of brightness, is as good as explained.
 constexpr double explained = 0.01;
 
-Place best_place(const ReflectanceMap& map, const Lattice& lattice, const float* observed,
-                 float saturated) {
-  const PixelCost cost(map, saturated, observed);
+Place best_place(const ReflectanceMap& map, const Lattice& lattice, const Observed& observed) {
+  const PixelCost cost(map, observed);
   thread_local ceres::TinySolver<PixelCost> solver;
   solver.options.max_num_iterations = 20;
   Place best = Place::Zero();
   double least = std::numeric_limits<double>::max();
-  for (Place place : lattice.starts(observed, saturated, most_starts)) {
+  for (Place place : lattice.starts(observed, most_starts)) {
     const double penalty = solver.Solve(cost, &place).final_cost;
     if (penalty < least) {
       least = penalty;
@@ -119,7 +114,7 @@ Place best_place(const ReflectanceMap& map, const Lattice& lattice, const float*
 }  // namespace
 
 std::vector<Place> estimate_pixelwise(const ReflectanceMap& map, const Level& level, int threads,
-                                      Monitor& monitor) {
+                                      Monitor& monitor, double from, double to) {
   const Lattice lattice(map);
   std::vector<Place> places(level.grid.size(), Place::Zero());
   std::atomic<int> done = 0;
@@ -128,9 +123,9 @@ std::vector<Place> estimate_pixelwise(const ReflectanceMap& map, const Level& le
     for (int column = 0; column < level.grid.columns; ++column) {
       const std::size_t pixel = level.grid.at(row, column);
       if (!level.grid.mask[pixel]) continue;
-      places[pixel] = best_place(map, lattice, level.at(pixel), level.saturated);
+      places[pixel] = best_place(map, lattice, level.at(pixel));
     }
-    monitor.report("normals", static_cast<double>(++done) / level.grid.rows);
+    monitor.report("normals", from + (to - from) * ++done / level.grid.rows);
   });
   return places;
 }

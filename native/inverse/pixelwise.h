@@ -11,8 +11,9 @@ namespace lobefit {
 
 // For each pixel of the level the place that explains it best, of all that face the viewer: the
 // best places of a grid over the stereographic plane are refined by Ceres. Every pixel is estimated
-// by itself, so that edges stay sharp and the result is the same for any number of threads.
+// by itself, so that the result is the same for any number of threads. Progress runs between two
+// values.
 std::vector<Place> estimate_pixelwise(const ReflectanceMap& map, const Level& level, int threads,
-                                      Monitor& monitor);
+                                      Monitor& monitor, double from, double to);
 
 }  // namespace lobefit

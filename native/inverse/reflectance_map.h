@@ -28,6 +28,7 @@ class ReflectanceMap {
                  double floor, int threads, Monitor& monitor);
 
   int channels() const { return channels_; }
+  float floor() const { return floor_; }
   float compressed(float value) const;
 
   // The values at a place within the unit circle, and their derivatives by u and v.

@@ -505,12 +505,14 @@ Pictures pictures_from(const FloatArray& values, const MaskArray& mask,
 
 std::unique_ptr<NormalsJob> start_normals_job(const FloatArray& values, const MaskArray& mask,
                                               const py::list& lighting, const py::object& source,
-                                              double floor, float saturation, int threads) {
+                                              double floor, double noise, float saturation,
+                                              int threads) {
   if (!(floor > 0)) throw InputError("floor: expected a value above 0.");
+  if (!(noise >= 0)) throw InputError("noise: expected a value of at least 0.");
   if (threads < 0) throw InputError("threads: expected 0 (all) or more, found a negative number.");
   return std::make_unique<NormalsJob>(
       [pictures = pictures_from(values, mask, lighting_from(lighting), saturation),
-       reflectance = previewed(source), options = NormalsOptions{floor, threads}](
+       reflectance = previewed(source), options = NormalsOptions{floor, noise, threads}](
           Monitor& monitor) { return estimate_normals(pictures, reflectance, options, monitor); });
 }
 
@@ -849,8 +851,8 @@ void bind_jobs(py::module_& module) {
   py::class_<NormalsJob> normals(module, "NormalsJob",
                                  "Normals from shading, in a thread of its own.");
   normals.def(py::init(&start_normals_job), py::arg("pictures"), py::arg("mask"),
-              py::arg("lighting"), py::arg("source"), py::arg("floor"), py::arg("saturation"),
-              py::arg("threads") = 0,
+              py::arg("lighting"), py::arg("source"), py::arg("floor"), py::arg("noise"),
+              py::arg("saturation"), py::arg("threads") = 0,
               "Starts at once; lobefit.normals says what all of it is. source is as in preview.");
   bind_job_methods(normals, [](NormalsJob& job) -> NormalsJob& { return job; });
   normals.def(

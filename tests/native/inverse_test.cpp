@@ -11,6 +11,7 @@
 #include "inverse/height.h"
 #include "inverse/normals.h"
 #include "inverse/pixel_cost.h"
+#include "inverse/pixelwise.h"
 #include "inverse/shading.h"
 #include "inverse/stereographic.h"
 #include "reflectance/classic.h"
@@ -93,7 +94,7 @@ Scene scene_of(const Shape& shape, const std::vector<Lighting>& lighting, int si
 Normals estimate(const Pictures& pictures, int threads = 2,
                  const Reflectance& reflectance = glossy()) {
   Monitor monitor;
-  return estimate_normals(pictures, reflectance, {1e-3, threads}, monitor);
+  return estimate_normals(pictures, reflectance, {1e-3, 0, threads}, monitor);
 }
 
 // Angles between normals in degrees, in rising order.
@@ -162,7 +163,7 @@ TEST(Inverse, TheCostIsThePenaltyAndItsDerivativesAreRight) {
   map.evaluate({0.3, 0.1}, seen, by_u, by_v);
   seen[0] += 0.7f, seen[5] -= 2.5f, seen[9] = 20;
   const Prior prior{Vector3(0.1, 0.2, 0.97), 3, Vector3(0.9, 0.1, 0.4).normalized(), 2};
-  const PixelCost cost(map, 15, seen.data(), prior);
+  const PixelCost cost(map, {seen.data(), map.channels(), 15, 0.5f}, prior);
   using Residuals = Eigen::VectorXd;
   const int count = cost.NumResiduals();
   Residuals here(count), after(count), before(count);
@@ -217,6 +218,49 @@ TEST(Inverse, ShadowsAndCutHighlightsDoNotBendNormals) {
   // Taken for what they show, the cut values do bend normals.
   scene.pictures.saturation = 1e30f;
   EXPECT_GT(most(), 0.4);
+}
+
+// Polished metal: dark but in its highlights.
+Reflectance polished() {
+  Parameters parameters;
+  parameters.diffuse = Rgb::Zero();
+  parameters.specular = Rgb(200, 180, 120);
+  parameters.exponent = Rgb::Constant(20);
+  parameters.interpolation = 0.5;
+  return [=](const Vector3& wi, const Vector3& wo) -> Rgb {
+    return evaluate_model(parameters, wi, wo) * std::max(wi.z(), 0.0);
+  };
+}
+
+TEST(Inverse, WhereNoiseHidesAPixelItsNeighboursTell) {
+  Scene scene = scene_of(waves, ring(), 96, polished());
+  float brightest = 0;
+  for (const std::vector<float>& values : scene.pictures.values) {
+    brightest = std::max(brightest, *std::max_element(values.begin(), values.end()));
+  }
+  const float noise = 0.0025f * brightest;
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal(0, noise);
+  for (std::vector<float>& values : scene.pictures.values) {
+    for (float& value : values) value += normal(random);
+  }
+  Monitor monitor;
+  const Reflectance reflectance = polished();
+  const auto error = [&](double told) {
+    const NormalsOptions options{2 * noise, told, 2};
+    return median_error(scene,
+                        estimate_normals(scene.pictures, reflectance, options, monitor).normals);
+  };
+  const ReflectanceMap map(reflectance, scene.pictures.lighting, 2 * noise, 2, monitor);
+  const Level level = level_of(scene.pictures, map, noise);
+  std::vector<Vector3> alone;
+  for (const Place& place : estimate_pixelwise(map, level, 2, monitor, 0, 1)) {
+    alone.push_back(normal_at(place));
+  }
+  const double found = error(noise);
+  EXPECT_LT(found, median_error(scene, alone) / 2);
+  // Where noise is not known for what it is, dark pixels count as much as bright ones.
+  EXPECT_LT(found, error(0) / 2);
 }
 
 TEST(Inverse, NormalsAreTheSameForAnyNumberOfThreads) {
@@ -296,7 +340,7 @@ TEST(Inverse, ItCanBeCancelled) {
   const Scene scene = scene_of(sphere, ring(), 32);
   Monitor monitor;
   monitor.cancel();
-  EXPECT_THROW(estimate_normals(scene.pictures, glossy(), {1e-3, 2}, monitor), Cancelled);
+  EXPECT_THROW(estimate_normals(scene.pictures, glossy(), {1e-3, 0, 2}, monitor), Cancelled);
 }
 
 }  // namespace

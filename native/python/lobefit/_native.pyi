@@ -89,6 +89,7 @@ class NormalsJob:
         lighting: list[dict[str, Any]],
         source: Measurement | dict[str, Any] | tuple[str, dict[str, Any]],
         floor: float,
+        noise: float,
         saturation: float,
         threads: int = 0,
     ) -> None: ...

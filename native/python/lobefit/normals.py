@@ -42,8 +42,9 @@ class Job:
     `pictures` are (K, rows, columns, 3) in linear light, of the same points under the K lightings;
     `mask` (rows, columns) tells which pixels show the surface. `source` is its reflectance, as
     `reflectance_of` makes it, a Measurement, or ("classic", a dict of model 'classic-phong' or
-    'classic-blinn-phong', diffuse k_d, specular k_s and exponent). With three pictures or more each
-    pixel is estimated by itself, with fewer all together, from the silhouette inward. Values of
+    'classic-blinn-phong', diffuse k_d, specular k_s and exponent). With three pictures or more a
+    pixel's neighbours decide only where noise hides what it shows, with fewer all pixels are
+    estimated together, from the silhouette inward. Values of
     `saturation` and above only tell that a pixel was at least that bright. `noise` is the standard
     deviation of a pixel's value; if None it is estimated. `threads` 0 takes every processor; the
     result is the same for any number.
@@ -63,12 +64,15 @@ class Job:
         shown = np.asarray(mask, bool)
         if not shown.any():
             raise InputError("pictures: expected pixels that show the surface, found none.")
+        if noise is None:
+            noise = max(_noise(picture, shown) for picture in values)
         self._job = _native.NormalsJob(
             values,
             shown,
             [each.entries() for each in lighting],
             source,
-            _floor(values, shown, noise),
+            max(2 * noise, _DARK * float(np.percentile(values[:, shown], 99)), 1e-12),
+            noise,
             saturation,
             threads,
         )
@@ -198,14 +202,6 @@ def as_displacement(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], 
     highest = float(heights.max())
     scale = highest / heights.shape[1]
     return (heights / highest if highest > 0 else heights), scale
-
-
-def _floor(pictures: NDArray[np.float32], mask: NDArray[np.bool_], noise: float | None) -> float:
-    """Below which value noise rules."""
-    bright = float(np.percentile(pictures[:, mask], 99))
-    if noise is None:
-        noise = max(_noise(picture, mask) for picture in pictures)
-    return max(2 * noise, _DARK * bright, 1e-12)
 
 
 def _noise(picture: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
