@@ -174,7 +174,7 @@ class Fitter {
   }
 
   VectorXd run_subsample(const std::vector<Candidate>& candidates) {
-    const VectorXd x = run_on_subsample(candidates);
+    VectorXd x = run_on_subsample(candidates);
     constexpr double smoothing = 1;  // which the true value does not have
     const Objective all(all_, variables_, options_.norm, smoothing, threads_);
     fit_.stages.front().error = mean_error(all.evaluate(x).true_value);

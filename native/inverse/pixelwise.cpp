@@ -57,8 +57,8 @@ class Lattice {
 
  private:
   // Steps of 7 degrees in the middle and 4 at the rim.
-  static constexpr int side = 33;
-  static double coordinate(int i) { return (i - side / 2) * (2.0 / (side - 1)); }
+  static constexpr int middle = 16, side = 2 * middle + 1;
+  static double coordinate(int i) { return (i - middle) * (1.0 / middle); }
 
   float penalty(const float* predicted, const Observed& observed) const {
     float sum = 0;

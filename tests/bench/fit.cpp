@@ -81,8 +81,8 @@ void time_work(benchmark::State& state, const Work& work) {
 
 // What the parts of a fit work on, as fit.cpp chooses it.
 struct Parts {
-  const FitOptions options;
-  const Monitor monitor;
+  const FitOptions options{};
+  const Monitor monitor{};
   const int threads = thread_count(0);
   const Variables variables{options.kind, options.fresnel, options.separate_channels,
                             Specular::peak};

@@ -218,7 +218,7 @@ TEST(Fit, HasOneOptimumByEverySchedule) {
   const Parameters known = truth(ModelKind::interpolated, 40, 0.6, 1.8);
   const Measurement table = noisy_table_of(known, 0.1);
   const auto fitted = [&](Schedule schedule) {
-    const Fit fit = fit_of(table, {.schedule = schedule});
+    Fit fit = fit_of(table, {.schedule = schedule});
     EXPECT_NEAR(fit.stages.back().error, fit.errors.l1.pooled, 1e-6 * fit.errors.l1.pooled);
     return fit;
   };

@@ -213,7 +213,7 @@ TEST(CompressedCost, HasValueGradientAndMatrixOfTheObjective) {
   const double* parameters[] = {values.data()};
   double* jacobians[] = {jacobian.data()};
   ASSERT_TRUE(cost.Evaluate(parameters, residuals.data(), jacobians));
-  const Evaluation at = objective.evaluate(x);
+  const Evaluation& at = objective.evaluate(x);
   const VectorXd gradient = at.gradient(free);
   const MatrixXd hessian = at.hessian(free, free);
   EXPECT_NEAR(residuals.squaredNorm(), at.value, 1e-12 * at.value);

@@ -46,7 +46,7 @@ class TensorFiles : public ::testing::Test {
         read_measurement(path_);
       }
     } catch (const InputError& error) {
-      const std::string said = error.what();
+      std::string said = error.what();
       EXPECT_EQ(said.find(path_.string() + ": expected "), 0u) << said;
       EXPECT_TRUE(said.back() == '.' || said.back() == '?') << said;
       EXPECT_EQ(said.find_first_of("\n\r"), std::string::npos) << said;
