@@ -157,7 +157,10 @@ TEST(Minimise, FindsTheCertifiedReflectancesOfAShape) {
   EXPECT_LE(found, least * 1.001);
 }
 
+// The stages are solved to 1e-7, the polish until a step gains less than 2e-6 of the objective,
+// which may be a few such steps above the minimum that both came to.
 TEST(Fit, PolishIsNoWorseThanStages) {
+  constexpr double steps_left = 1e-5;
   for (const char* name : {"nickel", "red-fabric2"}) {
     const Measurement sample = sample_measurement(name);
     FitOptions options;
@@ -165,7 +168,7 @@ TEST(Fit, PolishIsNoWorseThanStages) {
     options.schedule = Schedule::stages;
     const Fit staged = fit_of(sample, options);
     EXPECT_EQ(staged.stages.size(), 3u);
-    EXPECT_LE(polished, staged.errors.l1.pooled * (1 + 1e-6)) << name;
+    EXPECT_LE(polished, staged.errors.l1.pooled * (1 + steps_left)) << name;
   }
 }
 
