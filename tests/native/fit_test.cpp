@@ -158,9 +158,9 @@ TEST(Minimise, FindsTheCertifiedReflectancesOfAShape) {
 }
 
 // The stages are solved to 1e-7, the polish until a step gains less than 2e-6 of the objective,
-// which may be a few such steps above the minimum that both came to.
+// which may be several such steps above the minimum that both came to: ten are allowed.
 TEST(Fit, PolishIsNoWorseThanStages) {
-  constexpr double steps_left = 1e-5;
+  constexpr double steps_left = 2e-5;
   for (const char* name : {"nickel", "red-fabric2"}) {
     const Measurement sample = sample_measurement(name);
     FitOptions options;
