@@ -181,6 +181,14 @@ def whole() -> bytes:
     return whole_record()
 
 
+def test_a_number_that_no_float_holds_is_refused(whole):
+    # Found by fuzzing: under a key that is not known it was read, and could not be written again.
+    text = whole.replace(b'"principled":{', b'"principled":{"later":-1e999,', 1)
+    assert text != whole
+    with pytest.raises(InputError, match="found the number -1e999, which is too large"):
+        Record.from_json(text, "gold.json")
+
+
 def damaged(whole: bytes) -> Iterator[bytes]:
     for at, byte in enumerate(whole):
         for flip in (0x01, 0x80):

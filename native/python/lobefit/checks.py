@@ -38,7 +38,12 @@ def checked_json(text: str | bytes, name: str, what: str, check: Check) -> Any:
     Raises InputError, one sentence with the `name` of the file and `what` it should hold.
     """
     try:
-        data = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique)
+        data = json.loads(
+            text,
+            parse_float=_finite,
+            parse_constant=_refuse_constant,
+            object_pairs_hook=_unique,
+        )
     except UnicodeDecodeError as error:
         raise InputError(f"{name}: expected {what} in UTF-8, found other bytes.") from error
     except RecursionError as error:
@@ -52,6 +57,14 @@ def checked_json(text: str | bytes, name: str, what: str, check: Check) -> Any:
         expected, found = mismatch.expected, mismatch.found
         raise InputError(f"{name}: expected {where} to be {expected}, found {found}.") from None
     return data
+
+
+def _finite(text: str) -> float:
+    """A number; one that no float holds could not be written again, whatever it stands for."""
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError(f"the number {text[:40]}, which is too large")
+    return value
 
 
 def _refuse_constant(name: str) -> float:
