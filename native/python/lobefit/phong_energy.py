@@ -34,7 +34,7 @@ class Energy:
 
     @property
     def normalising(self) -> Any:
-        """What times the lobe reflects all light at this angle."""
+        """The factor by which the lobe reflects all light at this angle."""
         return 1 / self.integral
 
 
