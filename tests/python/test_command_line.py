@@ -251,6 +251,16 @@ def test_info_tells_what_a_record_holds(tmp_path, table, capfd):
     assert json.loads(capfd.readouterr().out)["uncertainty"]["blocks"] >= 20
 
 
+@pytest.mark.parametrize("command", ["fit", "preview", "material"])
+def test_what_is_read_is_not_written_over(tmp_path, table, capfd, command):
+    path, link = tmp_path / "gold.binary", tmp_path / "link.binary"
+    path.write_bytes(table.read_bytes())
+    link.symlink_to(path)
+    before = path.read_bytes()
+    assert "expected the name of another file to write" in refuse(capfd, command, path, "-o", link)
+    assert path.read_bytes() == before
+
+
 def test_a_record_cannot_be_written_onto_a_folder(tmp_path, table, capfd):
     assert "found a folder" in refuse(capfd, "fit", table, "-o", tmp_path)
 

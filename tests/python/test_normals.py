@@ -82,12 +82,28 @@ def test_normals_of_renders_in_files(renders, tmp_path, capfd):
     assert main([*words, "--height", str(height), "-o", str(output), "--json"]) == 0
     told = json.loads(capfd.readouterr().out)
     assert told["pictures"] == 6 and told["pixels"] == sphere().any(-1).sum()
+    # Pixels at the silhouette, half of them dark, are some per mille of the light.
+    assert told["unexplained"] < 0.01
     # 16 bits are finer than what the estimate finds, and the estimate than .1 degrees.
     assert median_error(decoded(output), sphere()) < 0.1
     assert np.allclose(decoded(output)[0, 0], [0, 0, 1], atol=1e-4)
     heights = read_image(height).light[..., 0]
     # In widths of the picture: a dome of .9 half widths, of whose rim the slopes tell little.
     assert heights.max() == pytest.approx(0.45, rel=0.25)
+
+
+def test_lights_in_the_wrong_order_leave_light_unexplained(renders, tmp_path, capfd):
+    paths, _ = renders
+    first, second, *others = ring()
+    # All of them turned round would explain the mirror image of the sphere.
+    swapped = [
+        Lighting(first.lights, image=second.image),
+        Lighting(second.lights, image=first.image),
+        *others,
+    ]
+    words = ["normals", *paths, "--lights", str(lights_file(tmp_path, swapped)), *WORDS]
+    assert main([*words, "-o", str(tmp_path / "normal.png"), "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["unexplained"] > 0.1
 
 
 def test_eight_bits_are_decoded_from_srgb(tmp_path):
@@ -210,6 +226,17 @@ def test_wrong_use_is_one_sentence(renders, tmp_path, capfd, changed, sentence):
     told = refuse(capfd, "normals", *paths, "--lights", lights, *words, *changed)
     assert sentence.replace("0.0 to 1000000.0", "0") in told
     assert not (tmp_path / "normal.png").exists()
+
+
+def test_no_picture_is_written_over(renders, tmp_path, capfd):
+    paths, lights = renders
+    before = (tmp_path / "0.exr").read_bytes()
+    words = ["normals", *paths, "--lights", lights, *WORDS]
+    told = refuse(capfd, *words, "-o", paths[0])
+    assert f"found {paths[0]}, which is read." in told
+    assert (tmp_path / "0.exr").read_bytes() == before
+    same = str(tmp_path / "same.png")
+    assert "which is written too" in refuse(capfd, *words, "-o", same, "--height", same)
 
 
 def test_pictures_that_do_not_fit_are_refused(renders, tmp_path, capfd, table):

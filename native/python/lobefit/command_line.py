@@ -70,6 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Runs one command and returns its exit code; never a traceback for what a user may do."""
     try:
         options = _parser().parse_args(arguments)
+        _keep_what_is_read(options)
         code: int = options.run(options)
         sys.stdout.flush()
         return code
@@ -90,6 +91,26 @@ def main(arguments: list[str] | None = None) -> int:
         return _complain("expected enough memory, found too little.")
     except ImportError as error:
         return _complain(f"stopped, a part of Python cannot be loaded ({error}).")
+
+
+def _keep_what_is_read(options: argparse.Namespace) -> None:
+    """Refuses to write over a file that is read, or two results to one file.
+
+    Closures are added to a record that may keep its place, and a Blender file is changed where it
+    is if that is asked for: neither loses anything.
+    """
+    if options.run in (_closures, _simplify):
+        return
+    given = vars(options)
+    read: list[str] = [*given.get("files", ()), *given.get("images", ())]
+    read += [given[name] for name in ("file", "lights", "mask", "material") if given.get(name)]
+    kept = {os.path.realpath(path): f"{path}, which is read" for path in read}
+    for place in (given.get("output"), given.get("height")):
+        if not place or os.path.isdir(place):
+            continue
+        if what := kept.get(os.path.realpath(place)):
+            raise InputError(f"{place}: expected the name of another file to write, found {what}.")
+        kept[os.path.realpath(place)] = f"{place}, which is written too"
 
 
 def _drop_output() -> None:
@@ -466,7 +487,7 @@ def _add_energy(commands: Any) -> None:
         type=_within(float, 0, MOST_EXPONENT, "an exponent"),
         required=True,
         metavar="N",
-        help="any real one",
+        help=f"from 0 to {MOST_EXPONENT:g}",
     )
     command.add_argument(
         "--angle",
@@ -524,8 +545,8 @@ def _add_normals(commands: Any) -> None:
     command.add_argument(
         "--kind",
         choices=normals.KINDS,
-        help="the fitted model, as for photographs, or what Cycles renders of this kind of "
-        "material; default: model",
+        help="the fitted model, or what Cycles renders of this kind of material; for photographs "
+        "the measured file itself is nearest; default: model",
     )
     for name, text in {"diffuse": "k_d", "specular": "k_s"}.items():
         command.add_argument(
@@ -875,8 +896,8 @@ def _library(options: argparse.Namespace) -> int:
     count = options.closures if options.kind in TARGETS else None
     places = [(item.file, item.place) for item in items]
     tasks = tasks_at(places, requests, _fit_options(options))
-    for task in tasks:
-        make_folder(task.place.parent)
+    for place in {task.place.parent for task in tasks if task.source.exists()}:
+        make_folder(place)
     records: dict[Path, Record] = {}
 
     def show(task: Task, record: Record) -> None:
@@ -1011,11 +1032,14 @@ def _normals(options: argparse.Namespace) -> int:
             threads=options.threads,
         )
     seconds = time.perf_counter() - began
+    shown = normals.shade(surface.normals, lighting, source)
+    off = normals.unexplained(pictures, shown, options.saturation)
     images.write_image(options.output, normals.as_normal_map(surface.normals))
     result = {
         "normals": options.output,
         "pictures": len(names),
         "pixels": int(pictures.mask.sum()),
+        "unexplained": off,
         "seconds": seconds,
     }
     if options.height:
@@ -1026,7 +1050,11 @@ def _normals(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(result))
         return DONE
-    print(f"{options.output}: {result['pixels']:,} pixels, {len(names)} pictures, {seconds:.1f} s")
+    count = f"{len(names)} picture{'s' if len(names) > 1 else ''}"
+    print(
+        f"{options.output}: {result['pixels']:,} pixels, {count}, {off:.1%} of their light is not "
+        f"explained, {seconds:.1f} s"
+    )
     if options.height:
         print(
             f"{options.height}: in a Displacement node with Midlevel 0 and Scale "

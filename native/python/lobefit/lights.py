@@ -144,26 +144,28 @@ def _some(item: Any, most: int) -> Any:
     def check(value: Any, where: str) -> None:
         list_of(item)(value, where)
         if not 1 <= len(value) <= most:
-            raise Mismatch(where, f"a list of 1 to {most}", _Items(len(value)))
+            raise Mismatch(where, f"a list of 1 to {most}", _Found(f"one of {len(value)}"))
 
     return check
 
 
-class _Items(Missing):
-    """What is found where a list is too long, or too short."""
+class _Found(Missing):
+    """What is found, in words, where the value itself would tell too little."""
 
-    def __init__(self, count: int) -> None:
-        self._count = count
+    def __init__(self, words: str) -> None:
+        self._words = words
 
     def __str__(self) -> str:
-        return f"one of {self._count}"
+        return self._words
 
 
 def _file(data: Any, where: str) -> None:
     _SHAPE(data, where)
     images = [picture["image"] for picture in data["pictures"] if "image" in picture]
-    if images and len(images) < len(data["pictures"]):
-        raise Mismatch("the key image", "in every picture or in none", _Items(len(images)))
+    count = len(data["pictures"])
+    if images and len(images) < count:
+        found = _Found(f"it in {len(images)} of {count}")
+        raise Mismatch("the key image", "in every picture or in none", found)
     if len(set(images)) < len(images):
         raise Mismatch("pictures", "of different images", images)
 

@@ -187,6 +187,20 @@ def shade(normals: ArrayLike, lighting: Sequence[Lighting], source: Any) -> NDAr
     return pictures
 
 
+def unexplained(
+    pictures: Pictures, shown: NDArray[np.float32], saturation: float | None = None
+) -> float:
+    """Which part of the pictures' light is off where the surface is `shown` as it was found.
+
+    Shadows and a wrong material or light count, and what was cut off only where too little is
+    shown; some per cent are usual. `saturation` stands for that of the pictures, if given.
+    """
+    most = saturation or pictures.saturation
+    seen = np.minimum(pictures.values[:, pictures.mask], most)
+    off = np.abs(seen - np.minimum(shown[:, pictures.mask], most)).sum(dtype=np.float64)
+    return float(off / max(np.abs(seen).sum(dtype=np.float64), 1e-30))
+
+
 def as_normal_map(normals: NDArray[np.float32]) -> NDArray[np.float32]:
     """The colors (0..1) of a tangent-space map for Blender's Normal Map node (OpenGL's +Y).
 
