@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ struct ExtremeTable {
   std::function<Measurement()> make;
   std::optional<Parameters> truth;
   bool degenerate = false;
+
+  // GoogleTest would print the bytes, those between the members too, which nobody has written.
+  friend void PrintTo(const ExtremeTable& table, std::ostream* out) { *out << table.name; }
 };
 
 // Every table that a fit has an answer to; one without a valid bin, no_valid_bin(), has none.
