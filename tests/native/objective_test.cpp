@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 #include <random>
 #include <vector>
 
@@ -25,6 +26,12 @@ struct Case {
   bool separate_channels;
   Norm norm;
 };
+
+// GoogleTest would print the bytes, those between the members too, which nobody has written.
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << name_of(c.kind) << (c.fresnel ? ", Fresnel" : "")
+       << (c.separate_channels ? ", separate channels, " : ", ") << name_of(c.norm);
+}
 
 const Measurement& table() {
   static const Measurement sample = sample_measurement("violet-rubber");
