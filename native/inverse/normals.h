@@ -24,9 +24,8 @@ struct Normals {
 
 // The normals that explain the pictures best, and the surface that has them. From three pictures on
 // a pixel's neighbours decide only where noise hides what it shows; from fewer all pixels are
-// estimated together, by way of the silhouette. The
-// reflectance is f cos(theta_i) and is called from several threads. The same for any number of
-// threads.
+// estimated together, by way of the silhouette. The reflectance is f cos(theta_i) and is called
+// from several threads. The same for any number of threads.
 Normals estimate_normals(const Pictures& pictures, const Reflectance& f_times_cosine,
                          const NormalsOptions& options, Monitor& monitor);
 

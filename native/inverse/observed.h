@@ -34,8 +34,6 @@ class Observed {
     weights_ = Penalty::rounding / (square + noises.square()).sqrt();
   }
 
-  int channels() const { return static_cast<int>(values_.size()); }
-
   // How far a channel is off what is predicted, and the derivative of that by the latter.
   struct Misfit {
     float value, slope;

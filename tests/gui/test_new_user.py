@@ -10,7 +10,7 @@ MEASURED = """
 """
 # The mean colour of the middle of the picture, encoded as it is shown.
 SHOWN = """
-path = '/lobefit/rendered.png'
+path = {path!r}
 bpy.data.images['Render Result'].save_render(path)
 picture = bpy.data.images.load(path)
 (columns, rows), pixels = picture.size, picture.pixels[:]
@@ -74,7 +74,7 @@ def test_from_the_zip_to_a_picture(window):
     window.wait_for("not bpy.app.is_job_running('RENDER')")
     time.sleep(2)
     tell("a picture")
-    red, green, _ = window.ask(SHOWN)
+    red, green, _ = window.ask(SHOWN.format(path=str(window.inside / "rendered.png")))
     # The rubber is pink, and nothing else in the picture has a colour.
     assert red > 1.3 * green
 

@@ -6,6 +6,7 @@ progress bar to stderr.
 """
 
 import argparse
+import dataclasses
 import io
 import json
 import math
@@ -896,8 +897,8 @@ def _library(options: argparse.Namespace) -> int:
     count = options.closures if options.kind in TARGETS else None
     places = [(item.file, item.place) for item in items]
     tasks = tasks_at(places, requests, _fit_options(options))
-    for place in {task.place.parent for task in tasks if task.source.exists()}:
-        make_folder(place)
+    for task in tasks:
+        make_folder(task.place.parent)
     records: dict[Path, Record] = {}
 
     def show(task: Task, record: Record) -> None:
@@ -1019,6 +1020,8 @@ def _normals(options: argparse.Namespace) -> int:
     lighting = in_order(read_lights(options.lights), names, options.lights)
     source = _shown_material(options)
     pictures = normals.read_pictures(options.images, options.mask, options.linear)
+    if options.saturation:
+        pictures = dataclasses.replace(pictures, saturation=options.saturation)
     began = time.perf_counter()
     with progress_bar(names[0]) as progress:
         surface = normals.normals(
@@ -1027,13 +1030,13 @@ def _normals(options: argparse.Namespace) -> int:
             source,
             progress,
             mask=pictures.mask,
-            saturation=options.saturation or pictures.saturation,
+            saturation=pictures.saturation,
             noise=options.noise,
             threads=options.threads,
         )
     seconds = time.perf_counter() - began
     shown = normals.shade(surface.normals, lighting, source)
-    off = normals.unexplained(pictures, shown, options.saturation)
+    off = normals.unexplained(pictures, shown)
     images.write_image(options.output, normals.as_normal_map(surface.normals))
     result = {
         "normals": options.output,

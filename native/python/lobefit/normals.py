@@ -187,17 +187,17 @@ def shade(normals: ArrayLike, lighting: Sequence[Lighting], source: Any) -> NDAr
     return pictures
 
 
-def unexplained(
-    pictures: Pictures, shown: NDArray[np.float32], saturation: float | None = None
-) -> float:
+def unexplained(pictures: Pictures, shown: NDArray[np.float32]) -> float:
     """Which part of the pictures' light is off where the surface is `shown` as it was found.
 
     Shadows and a wrong material or light count, and what was cut off only where too little is
-    shown; some per cent are usual. `saturation` stands for that of the pictures, if given.
+    shown; some per cent are usual.
     """
-    most = saturation or pictures.saturation
-    seen = np.minimum(pictures.values[:, pictures.mask], most)
-    off = np.abs(seen - np.minimum(shown[:, pictures.mask], most)).sum(dtype=np.float64)
+    seen, found = (
+        np.minimum(values[:, pictures.mask], pictures.saturation)
+        for values in (pictures.values, shown)
+    )
+    off = np.abs(seen - found).sum(dtype=np.float64)
     return float(off / max(np.abs(seen).sum(dtype=np.float64), 1e-30))
 
 
