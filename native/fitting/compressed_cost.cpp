@@ -11,8 +11,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 CompressedCost::CompressedCost(const Objective& objective, std::vector<int> free, VectorXd x,
-                               const Monitor& monitor)
-    : objective_(objective), free_(std::move(free)), x_(std::move(x)), monitor_(monitor) {
+                               NewtonPause& pause, const Monitor& monitor)
+    : objective_(objective),
+      free_(std::move(free)),
+      x_(std::move(x)),
+      best_(x_),
+      pause_(pause),
+      monitor_(monitor) {
   set_num_residuals(static_cast<int>(free_.size()) + 1);
   mutable_parameter_block_sizes()->push_back(static_cast<int>(free_.size()));
 }
@@ -50,6 +55,10 @@ std::optional<CompressedCost::Block> CompressedCost::compress(const double* free
   const auto n = static_cast<Eigen::Index>(free_.size());
   const VectorXd x = within_bounds(free_values);
   const Evaluation at = objective_.evaluate(x, curvature);
+  if (at.value < best_value_) {
+    best_ = x;
+    best_value_ = at.value;
+  }
   const VectorXd gradient = at.gradient(free_);
   const MatrixXd hessian = at.hessian(free_, free_);
   // Columns are scaled to a unit diagonal, because k_s and log s differ by many orders; a variable
@@ -76,16 +85,16 @@ CompressedCost::Block CompressedCost::compress(const double* free_values) const 
   const bool known = point_.size() == point.size() && point_ == point;
   if (!known) {
     point_ = point;
-    curvature_ = waiting_ > 0 ? Curvature::reweighted : Curvature::newton;
-    waiting_ = std::max(0, waiting_ - 1);
+    curvature_ = pause_.next();
+    pause_.left = std::max(0, pause_.left - 1);
   }
   if (curvature_ == Curvature::newton) {
     if (const auto block = compress(free_values, Curvature::newton)) {
-      pause_ = 0;
+      pause_.length = 0;
       return *block;
     }
     curvature_ = Curvature::reweighted;
-    waiting_ = pause_ = std::clamp(2 * pause_, 1, 8);
+    pause_.left = pause_.length = std::clamp(2 * pause_.length, 1, 8);
   }
   return *compress(free_values, Curvature::reweighted);
 }

@@ -4,6 +4,7 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -24,7 +25,7 @@ namespace lobefit {
 // H is Newton's wherever a sum of squares can have it, which is close to the minimum: where it is
 // positive definite and F >= |R^-T g|^2. Elsewhere it is that of reweighted squares, for which both
 // hold always. Each asks for a pass of its own, so that after a point where Newton's fails it is
-// not tried at the next 1, 2, 4, 8, 8.. points.
+// not tried at the next 1, 2, 4, 8, 8.. points (NewtonPause).
 //
 // A step that leaves the bounds is cut where it first meets one; the solver is then to be stopped
 // (left_bounds) and started again without the variable that met its bound. Ceres' own bounds are
@@ -33,7 +34,7 @@ class CompressedCost final : public ceres::CostFunction {
  public:
   // Moves the variables `free` of x; the others keep their values.
   CompressedCost(const Objective& objective, std::vector<int> free, Eigen::VectorXd x,
-                 const Monitor& monitor);
+                 NewtonPause& pause, const Monitor& monitor);
 
   // False (which ends the solver) when the monitor was cancelled.
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -44,6 +45,10 @@ class CompressedCost final : public ceres::CostFunction {
 
   // Whether these values are cut.
   bool left_bounds(const double* free_values) const;
+
+  // Of all points asked about that with the least value. Ceres does not take the step whose gain is
+  // under its tolerance, though it knows what it leads to; a last step of Newton's gains digits.
+  const Eigen::VectorXd& best() const { return best_; }
 
  private:
   struct Block {
@@ -60,11 +65,12 @@ class CompressedCost final : public ceres::CostFunction {
   std::vector<int> free_;
   // Where the derivatives were last asked for: the point that the next step starts from.
   mutable Eigen::VectorXd x_;
-  // The latest point, what its matrix was, how many points Newton's was not to be tried at, and at
-  // how many more it is not.
+  mutable Eigen::VectorXd best_;
+  mutable double best_value_ = std::numeric_limits<double>::infinity();
+  // The latest point and what its matrix was.
   mutable Eigen::VectorXd point_;
   mutable Curvature curvature_ = Curvature::newton;
-  mutable int pause_ = 0, waiting_ = 0;
+  NewtonPause& pause_;
   const Monitor& monitor_;
 };
 

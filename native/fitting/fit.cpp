@@ -132,7 +132,7 @@ class Fitter {
 
   // Polish from the starts on a subsample, and of the best of these on a larger one; the error that
   // it leaves over all bins is not known then.
-  VectorXd run_on_subsample(const std::vector<Candidate>& candidates) {
+  Minimum run_on_subsample(const std::vector<Candidate>& candidates) {
     const Stopwatch watch;
     Stage stage{"polish of " + std::to_string(candidates.size()) +
                     " starts on a subsample, then of the best on a larger one",
@@ -145,16 +145,47 @@ class Fitter {
     std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision(), stage);
     judge_certainty(minima);
     monitor_.report("Trying the best of them", 0.5);
-    const std::vector<Minimum> finalists =
-        polish(some_, starts_of(best_of_each_shape(minima)), finishing_precision(), stage);
-    fit_.converged = finalists.front().converged;
+    const Minimum best = best_finalist(best_of_each_shape(minima), stage);
+    fit_.converged = best.converged;
     stage.seconds = watch.seconds();
     fit_.stages.push_back(stage);
-    return finalists.front().x;
+    return best;
   }
 
-  // Of sorted minima the best ones; where several have one shape, it is polished once.
+  // The best minimum on the larger subsample. Where starts disagree there are several basins, and
+  // for a lobe narrower than a bin a row of them along alpha: those next to the best are then tried
+  // too, for as long as that gains.
+  Minimum best_finalist(const std::vector<Minimum>& starts, Stage& stage) const {
+    constexpr int most_moves = 3;
+    const bool disagree = fit_.certainty.agree < fit_.certainty.starts;
+    Minimum best = polish(some_, starts_of(starts), finishing_precision(), stage).front();
+    for (int move = 0; disagree && move < most_moves; ++move) {
+      const std::vector<VectorXd> beside = beside_in_alpha(best.x);
+      if (beside.empty()) break;
+      const Minimum next = polish(some_, beside, finishing_precision(), stage).front();
+      if (!(next.true_value < best.true_value)) break;
+      best = next;
+    }
+    return best;
+  }
+
+  // Starts whose odds of alpha to 1 - alpha are half and twice those of x; none of a pure lobe.
+  std::vector<VectorXd> beside_in_alpha(const VectorXd& x) const {
+    const int alpha = variables_.interpolation();
+    if (alpha < 0 || is_pure(x[alpha])) return {};
+    std::vector<VectorXd> beside;
+    for (const double factor : {0.5, 2.0}) {
+      const double odds = factor * x[alpha] / (1 - x[alpha]);
+      beside.push_back(x);
+      beside.back()[alpha] = odds / (1 + odds);
+    }
+    return beside;
+  }
+
+  // Of sorted minima the best ones; where several have one shape, it is polished once. One that is
+  // so far off on a subsample is not the best on a larger one.
   std::vector<Minimum> best_of_each_shape(const std::vector<Minimum>& sorted) const {
+    constexpr double hopeless = 0.1;
     std::vector<Minimum> result;
     const auto same_shape = [&](const Minimum& one, const Minimum& other) {
       constexpr double near = 0.05;  // of log s and of alpha
@@ -165,6 +196,7 @@ class Fitter {
     };
     for (const Minimum& minimum : sorted) {
       if (result.size() == max_finalists) break;
+      if (minimum.true_value > (1 + hopeless) * sorted.front().true_value) break;
       const bool seen = std::any_of(result.begin(), result.end(), [&](const Minimum& better) {
         return same_shape(minimum, better);
       });
@@ -174,7 +206,7 @@ class Fitter {
   }
 
   VectorXd run_subsample(const std::vector<Candidate>& candidates) {
-    VectorXd x = run_on_subsample(candidates);
+    VectorXd x = run_on_subsample(candidates).x;
     constexpr double smoothing = 1;  // which the true value does not have
     const Objective all(all_, variables_, options_.norm, smoothing, threads_);
     fit_.stages.front().error = mean_error(all.evaluate(x).true_value);
@@ -182,9 +214,10 @@ class Fitter {
   }
 
   VectorXd run_polish(const std::vector<Candidate>& candidates) {
-    const VectorXd x = run_on_subsample(candidates);
+    const Minimum first = run_on_subsample(candidates);
     monitor_.report("Polishing on all bins", 0.6);
-    const Minimum last = run_stage("polish on all bins", variables_.all(), x, last_precision());
+    const Minimum last =
+        run_stage("polish on all bins", variables_.all(), first.x, last_precision(), first.pause);
     // What the starts came to over all bins is where the last polish began.
     fit_.stages.front().error = mean_error(last.start_value);
     return last.x;
@@ -227,10 +260,10 @@ class Fitter {
   }
 
   Minimum run_stage(const std::string& name, const std::vector<int>& free, const VectorXd& x,
-                    const Precision& precision) {
+                    const Precision& precision, NewtonPause pause = {}) {
     const Stopwatch watch;
     Minimum minimum =
-        minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_);
+        minimise(all_, variables_, options_.norm, free, x, precision, threads_, monitor_, pause);
     fit_.converged = minimum.converged;
     fit_.stages.push_back({name, mean_error(minimum.true_value), watch.seconds(),
                            minimum.iterations, all_.size(),

@@ -58,7 +58,7 @@ class StopAtBound final : public ceres::IterationCallback {
 void solve(const Objective& objective, const std::vector<int>& moved, const Precision& precision,
            const Monitor& monitor, Minimum& minimum) {
   VectorXd values = minimum.x(moved);
-  CompressedCost cost(objective, moved, minimum.x, monitor);
+  CompressedCost cost(objective, moved, minimum.x, minimum.pause, monitor);
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(ownership);
@@ -72,7 +72,7 @@ void solve(const Objective& objective, const std::vector<int>& moved, const Prec
   monitor.throw_if_cancelled();
   minimum.iterations += static_cast<int>(summary.iterations.size());
   minimum.converged = summary.termination_type == ceres::CONVERGENCE;
-  minimum.x = cost.within_bounds(values.data());
+  minimum.x = cost.best();
 }
 
 // One level: solves, and again as long as variables meet their bounds or come free of them. Where
@@ -85,7 +85,7 @@ void solve_level(const Objective& objective, const std::vector<int>& free,
   std::vector<int> moved;
   for (int round = 0; round < max_rounds && minimum.iterations < last_iteration; ++round) {
     monitor.throw_if_cancelled();
-    const VectorXd gradient = objective.evaluate(minimum.x, Curvature::newton).gradient;
+    const VectorXd gradient = objective.evaluate_slope(minimum.x, minimum.pause.next()).gradient;
     std::vector<int> now = movable(objective.variables(), free, minimum.x, gradient);
     minimum.converged |= now.empty();
     if (minimum.converged && (now.empty() || now == moved)) return;
@@ -122,14 +122,14 @@ double mean_misfit(const Samples& samples, const Variables& variables, const Vec
 
 Precision coarse_precision() { return {1, 0.04, 1e-4, 100}; }
 Precision fine_precision() { return {1, 0.01, 1e-7, 100}; }
-Precision finishing_precision() { return {1, 0.01, 1e-6, 100}; }
+Precision finishing_precision() { return {1.0 / 16, 0.01, 1e-6, 100}; }
 Precision last_precision() { return {0, 0.01, 2e-6, 30}; }
 
 Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const VectorXd& x, const Precision& precision,
-                 int threads, const Monitor& monitor) {
+                 int threads, const Monitor& monitor, NewtonPause pause) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
-  Minimum best{variables.clamp(x), unknown, unknown, 0, 0, false};
+  Minimum best{variables.clamp(x), unknown, unknown, 0, 0, false, pause};
   Minimum current = best;
   const bool wide = has_smoothing(norm) && precision.widest > 0;
   if (wide) ++current.passes;
@@ -138,15 +138,16 @@ Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
     const Objective objective(samples, variables, norm, smoothing, threads);
     current.converged = false;
     if (std::isinf(current.start_value)) {
-      current.start_value = objective.evaluate(current.x, Curvature::newton).true_value;
+      current.start_value = objective.evaluate_slope(current.x, current.pause.next()).true_value;
     }
     const double before = current.true_value;
     solve_level(objective, free, precision, monitor, current);
-    current.true_value = objective.evaluate(current.x, Curvature::newton).true_value;
+    current.true_value = objective.evaluate_slope(current.x, current.pause.next()).true_value;
     const double gain = best.true_value - current.true_value;
     if (gain > 0) best = current;
     current.passes += objective.passes();
     best.iterations = current.iterations;
+    best.pause = current.pause;
     best.passes = current.passes;
     if (std::abs(before - current.true_value) < 1e-6 * best.true_value) break;
   }

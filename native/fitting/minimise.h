@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fitting/monitor.h"
+#include "fitting/objective.h"
 #include "fitting/options.h"
 #include "fitting/samples.h"
 #include "fitting/variables.h"
@@ -18,6 +19,7 @@ struct Minimum {
   int iterations = 0;
   int passes = 0;  // over the samples
   bool converged = false;
+  NewtonPause pause{};
 };
 
 // How finely to minimise. The smoothing e falls from level to level by a factor of 4, down to
@@ -36,9 +38,9 @@ Precision last_precision();       // from the minimum of a subsample
 
 // Moves the variables `free` from x, level by level of smoothing, until the unsmoothed objective
 // stops improving, within the bounds: a variable at its bound is held there while its gradient
-// points outward. Throws Cancelled.
+// points outward. `pause` is that of the minimum which x is. Throws Cancelled.
 Minimum minimise(const Samples& samples, const Variables& variables, Norm norm,
                  const std::vector<int>& free, const Eigen::VectorXd& x, const Precision& precision,
-                 int threads, const Monitor& monitor);
+                 int threads, const Monitor& monitor, NewtonPause pause = {});
 
 }  // namespace lobefit

@@ -156,12 +156,18 @@ void add(KernelSums& total, const KernelSums& part) {
 }  // namespace
 
 const Evaluation& Objective::evaluate(const VectorXd& x, Curvature curvature) const {
-  const auto known = std::find_if(answers_.begin(), answers_.end(), [&](const Answer& answer) {
-    return answer.curvature == curvature && answer.x.size() == x.size() && answer.x == x;
+  auto known = std::find_if(answers_.begin(), answers_.end(), [&](const Answer& answer) {
+    return answer.curvature == curvature && answer.is_at(x);
   });
-  if (known == answers_.end()) answers_.back() = {x, curvature, pass(x, curvature)};
-  if (known != answers_.begin()) std::swap(answers_.front(), answers_.back());
+  if (known == answers_.end()) *--known = {x, curvature, pass(x, curvature)};
+  std::rotate(answers_.begin(), known, known + 1);
   return answers_.front().evaluation;
+}
+
+const Evaluation& Objective::evaluate_slope(const VectorXd& x, Curvature wanted) const {
+  const auto known = std::find_if(answers_.begin(), answers_.end(),
+                                  [&](const Answer& answer) { return answer.is_at(x); });
+  return evaluate(x, known == answers_.end() ? wanted : known->curvature);
 }
 
 Evaluation Objective::pass(const VectorXd& x, Curvature curvature) const {

@@ -17,6 +17,15 @@ namespace lobefit {
 // minimum and need not be positive definite farther off. For log_l2 both are Gauss and Newton's.
 enum class Curvature { reweighted, newton };
 
+// At how many points Newton's matrix was not to be tried after it had failed, and at how many more
+// it is not. A fit that goes on from another on more samples meets the same objective.
+struct NewtonPause {
+  int length = 0, left = 0;
+
+  // What the next point is asked about with.
+  Curvature next() const { return left > 0 ? Curvature::reweighted : Curvature::newton; }
+};
+
 struct Evaluation {
   double value = 0;          // F
   double true_value = 0;     // sum of weight |r| (without smoothing), or F for the square norms
@@ -36,9 +45,13 @@ class Objective {
 
   // One pass over the samples, or none where the same was asked a moment ago; x within its bounds.
   // The same bits for any number of threads, because each run is summed by itself and the runs in
-  // their order. The answer is good until the second next question. Not to be asked by two threads.
+  // their order. The answer is good until the next question. Not to be asked by two threads.
   const Evaluation& evaluate(const Eigen::VectorXd& x,
                              Curvature curvature = Curvature::reweighted) const;
+
+  // The same for those who need no matrix: that of the answer is of the curvature at hand, or of
+  // the one that is `wanted` next.
+  const Evaluation& evaluate_slope(const Eigen::VectorXd& x, Curvature wanted) const;
 
   const Variables& variables() const { return variables_; }
   double smoothing() const { return smoothing_; }
@@ -53,13 +66,18 @@ class Objective {
   Norm norm_;
   double smoothing_;
   int threads_;
-  // A solver comes back to the point it stands at after a step that led nowhere.
+  // A solver comes back to the point it stood at after a step that led nowhere; either point may
+  // have been asked about with both curvatures.
   struct Answer {
     Eigen::VectorXd x;
     Curvature curvature{};
     Evaluation evaluation;
+
+    bool is_at(const Eigen::VectorXd& point) const {
+      return x.size() == point.size() && x == point;
+    }
   };
-  mutable std::array<Answer, 2> answers_;  // the latest first
+  mutable std::array<Answer, 4> answers_;  // the latest first
   mutable int passes_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <ostream>
 #include <random>
 #include <vector>
@@ -213,7 +214,8 @@ TEST(CompressedCost, HasValueGradientAndMatrixOfTheObjective) {
   const VectorXd x = inside(variables);
   const std::vector<int> free = {3, 4, 5, 6, 7};
   const Monitor monitor;
-  const CompressedCost cost(objective, free, x, monitor);
+  NewtonPause pause;
+  const CompressedCost cost(objective, free, x, pause, monitor);
   const VectorXd values = x(free);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> jacobian(6, 5);
   VectorXd residuals(6);
@@ -234,6 +236,28 @@ TEST(CompressedCost, HasValueGradientAndMatrixOfTheObjective) {
   EXPECT_LT((jacobian.transpose() * jacobian - expected).norm(), 1e-11 * expected.norm());
 }
 
+// Also where the solver would not have taken it.
+TEST(CompressedCost, KnowsTheBestPointThatItWasAskedAbout) {
+  const FitOptions options;
+  const Samples samples = subsample(all_samples(table(), options), 2000);
+  const Variables variables(options.kind, true, false);
+  const Objective objective(samples, variables, Norm::l1, 0.1, 1);
+  const VectorXd x = inside(variables);
+  const Monitor monitor;
+  NewtonPause pause;
+  const CompressedCost cost(objective, {0, 1}, x, pause, monitor);
+  const double points[][2] = {{x[0], x[1]}, {2 * x[0], 2 * x[1]}, {0.5 * x[0], 0.5 * x[1]}};
+  double least = std::numeric_limits<double>::infinity();
+  VectorXd residuals(3);
+  for (const auto& point : points) {
+    const double* parameters[] = {point};
+    ASSERT_TRUE(cost.Evaluate(parameters, residuals.data(), nullptr));
+    least = std::min(least, residuals.squaredNorm());
+  }
+  EXPECT_NEAR(objective.evaluate(cost.best()).value, least, 1e-9 * least);
+  EXPECT_GT(residuals.squaredNorm(), 1.001 * least);
+}
+
 TEST(CompressedCost, CutsAStepAtTheBoundThatItMeets) {
   const FitOptions options;
   const Samples samples = subsample(all_samples(table(), options), 2000);
@@ -241,7 +265,8 @@ TEST(CompressedCost, CutsAStepAtTheBoundThatItMeets) {
   const Objective objective(samples, variables, Norm::l1, 0.1, 1);
   const VectorXd x = inside(variables);  // alpha = 0.4
   const Monitor monitor;
-  const CompressedCost cost(objective, {3, variables.interpolation()}, x, monitor);
+  NewtonPause pause;
+  const CompressedCost cost(objective, {3, variables.interpolation()}, x, pause, monitor);
   const double beyond[] = {x[3] + 2, 1.6};
   EXPECT_TRUE(cost.left_bounds(beyond));
   VectorXd expected = x;
