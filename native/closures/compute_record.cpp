@@ -75,7 +75,8 @@ RecordContents compute_record(const MeasurementSource& source, const FitOptions&
   monitor.throw_if_cancelled();
   monitor.report("Finding the Principled BSDF", 0.98);
   const Target target = sample_target(
-      [&](const Vector3& wi, const Vector3& wo) { return measurement->evaluate(wi, wo); });
+      [&](const Vector3& wi, const Vector3& wo) { return measurement->evaluate(wi, wo); },
+      options.threads);
   contents.principled = fit_principled(target, options.threads);
   monitor.throw_if_cancelled();
   contents.total_seconds = seconds_since(start);

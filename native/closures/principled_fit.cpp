@@ -44,6 +44,8 @@ const Vector& greatest() {
 constexpr int shared_unknowns = 4, own_unknowns = shared_unknowns + 2;
 using SharedDual = ceres::Jet<double, shared_unknowns>;
 using ColourDual = ceres::Jet<double, 2>;
+// What depends on one socket alone is differentiated by it alone.
+using OwnDual = ceres::Jet<double, 1>;
 
 // The unknown that each of them is.
 using OwnUnknowns = std::array<int, own_unknowns>;
@@ -180,18 +182,28 @@ double differentiate_channel(const PrincipledAtLight<SharedDual>& light, double 
   return value.a;
 }
 
+SharedDual as_shared(const OwnDual& value, int unknown) {
+  SharedDual shared(value.a);
+  shared.v[unknown] = value.v[0];
+  return shared;
+}
+
 NormalEquations linearise(const Views& views, const Vector& x, double smoothing) {
   using std::exp;
   const int brightest = brightest_tint(x);
-  const SharedSockets<SharedDual> shared = {
-      SharedDual(x[metallic], 0), exp(SharedDual(x[log_roughness], 1)), SharedDual(x[root], 2),
-      SharedDual(x[tint + brightest], 3)};
+  const OwnDual roughness = exp(OwnDual(x[log_roughness], 0)), own_root(x[root], 0);
+  const SharedSockets<SharedDual> shared = {SharedDual(x[metallic], 0), as_shared(roughness, 1),
+                                            SharedDual(x[root], 2),
+                                            SharedDual(x[tint + brightest], 3)};
   const auto of_view = [&](const View& view) {
     ChannelEquations sums;
     Eigen::Matrix<double, own_unknowns, 1> slope;
     const auto at_view = principled_at_view(shared, view.n_wo);
+    const OwnDual masking = ggx_masking(roughness, view.n_wo);
     for (const Sample& sample : view.samples) {
-      const auto light = principled_at_light(shared, at_view, sample.at);
+      const auto light = principled_at_light(shared, at_view, sample.at,
+                                             as_shared(schlick_weight(own_root, sample.at.wi_h), 2),
+                                             as_shared(ggx_lobe(roughness, masking, sample.at), 1));
       const double e = smoothing * sample.typical;
       for (std::size_t c = 0; c < 3; ++c) {
         const auto channel = static_cast<Eigen::Index>(c);

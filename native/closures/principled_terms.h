@@ -172,16 +172,23 @@ struct PrincipledAtLight {
   double wi_h;
 };
 
+// `schlick` is schlick_weight there and `lobe` ggx_lobe.
 template <typename T>
 PrincipledAtLight<T> principled_at_light(const SharedSockets<T>& shared,
-                                         const PrincipledAtView<T>& view, const FacetGeometry& at) {
-  const T& root = shared.reflectance_root;
-  const T schlick = schlick_weight(root, at.wi_h);
-  const T lobe = ggx_lobe(shared.roughness, view.masking, at);
+                                         const PrincipledAtView<T>& view, const FacetGeometry& at,
+                                         const T& schlick, const T& lobe) {
   const T metal = shared.metallic * lobe;
   const T dielectric = lobe - metal;
   const T untinted = dielectric * schlick;
-  return {metal, square(root) * (dielectric - untinted), untinted, view.diffuse * at.n_wi, at.wi_h};
+  return {metal, square(shared.reflectance_root) * (dielectric - untinted), untinted,
+          view.diffuse * at.n_wi, at.wi_h};
+}
+
+template <typename T>
+PrincipledAtLight<T> principled_at_light(const SharedSockets<T>& shared,
+                                         const PrincipledAtView<T>& view, const FacetGeometry& at) {
+  return principled_at_light(shared, view, at, schlick_weight(shared.reflectance_root, at.wi_h),
+                             ggx_lobe(shared.roughness, view.masking, at));
 }
 
 // f cos of a channel whose metal reflects `fresnel` of the lobe.

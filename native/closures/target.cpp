@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "closures/view_curve.h"
+#include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {
@@ -81,20 +82,23 @@ TargetView sample_view(const Reflectance& f, const Vector3& wo, double share, do
 
 }  // namespace
 
-Target sample_target(const Reflectance& f) {
-  constexpr double golden = 0.6180339887498949;
-  Target target;
-  SumByPhase light, weight;
-  double all_light = 0, all_weight = 0;
-  for (int i = 0; i < views; ++i) {
+Target sample_target(const Reflectance& f, int threads) {
+  Target target(views);
+  parallel_for(views, thread_count(threads), [&](int i) {
+    constexpr double golden = 0.6180339887498949;
     const double root = least_root + (1 - least_root) * (i + 0.5) / views;
     const double cosine = root * root;
     const Vector3 wo(std::sqrt(1 - cosine * cosine), 0, cosine);
     const double offset = std::fmod(0.5 + golden * i, 1.0);
-    target.push_back(sample_view(f, wo, picture_share(cosine), std::max(offset, 0.02)));
-    if (cosine < least_picture_cosine) continue;
-    for (const TargetLight& at : target.back().lights) {
-      const double cos_phase = at.wi.dot(wo), reflected = at.weight * at.reflected.sum();
+    target[static_cast<std::size_t>(i)] =
+        sample_view(f, wo, picture_share(cosine), std::max(offset, 0.02));
+  });
+  SumByPhase light, weight;
+  double all_light = 0, all_weight = 0;
+  for (const TargetView& view : target) {
+    if (view.wo.z() < least_picture_cosine) continue;
+    for (const TargetLight& at : view.lights) {
+      const double cos_phase = at.wi.dot(view.wo), reflected = at.weight * at.reflected.sum();
       light.add(cos_phase, reflected);
       weight.add(cos_phase, 3 * at.weight);
       all_light += reflected;

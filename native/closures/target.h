@@ -34,9 +34,9 @@ struct TargetView {
 // error 1.
 using Target = std::vector<TargetView>;
 
-// Samples f (1/sr, without the cosine; NaN where it is not known). Empty for a target that is
-// black or nowhere known.
-Target sample_target(const Reflectance& f);
+// Samples f (1/sr, without the cosine; NaN where it is not known), which `threads` threads (0 for
+// every processor) ask at once. Empty for a target that is black or nowhere known.
+Target sample_target(const Reflectance& f, int threads = 1);
 
 // The same with every so many-th view and light alone, which stand for the others; at least one of
 // each. Another choice of them has other views and lights.

@@ -633,7 +633,7 @@ std::unique_ptr<ClosureJob> start_closure_job(const py::object& source, int coun
                                  : model_reflectance(parameters_from(source.cast<py::dict>()));
   const ClosureFitOptions options{std::max(count, 0), cap_albedo, threads};
   return std::make_unique<ClosureJob>([=](Monitor& monitor) {
-    const Target sampled = sample_target(target);
+    const Target sampled = sample_target(target, threads);
     return count >= 0 ? fit_closures(sampled, options, monitor)
                       : fit_closures_within(sampled, tolerance, options, monitor);
   });
