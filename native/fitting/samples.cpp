@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "measurement/large_pages.h"
 #include "measurement/parallel.h"
 #include "reflectance/model.h"
 
@@ -107,7 +108,10 @@ class Builder {
       samples_.runs.push_back(run);
       theta_d_.push_back(d);
     }
-    for_each_column(samples_, [size](auto& column) { column.resize(size); });
+    for_each_column(samples_, [size](auto& column) {
+      column.resize(size);
+      ask_for_large_pages(column.data(), size * sizeof(column[0]));
+    });
     parallel_for(static_cast<int>(samples_.runs.size()), threads_, [&](int r) { fill_run(r); });
     return std::move(samples_);
   }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "measurement/large_pages.h"
 #include "measurement/parallel.h"
 
 namespace lobefit {
@@ -82,6 +83,7 @@ Neighbours periodic_neighbours(double coordinate, int bins) {
 Measurement::Measurement(const FillRows& fill, int threads, TableSource source)
     : planes_(std::make_unique_for_overwrite<double[]>(3 * static_cast<std::size_t>(bin_count))),
       source_(std::move(source)) {
+  ask_for_large_pages(planes_.get(), 3 * static_cast<std::size_t>(bin_count) * sizeof(double));
   std::array<BinCounts, theta_h_bins> counts;
   parallel_for(theta_h_bins, thread_count(threads), [&](int h) {
     double* const first = planes_.get() + index(h, 0, 0);
