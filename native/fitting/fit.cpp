@@ -154,19 +154,14 @@ class Fitter {
 
   // The best minimum on the larger subsample. Where starts disagree there are several basins, and
   // for a lobe narrower than a bin a row of them along alpha: those next to the best are then tried
-  // too, for as long as that gains.
+  // too.
   Minimum best_finalist(const std::vector<Minimum>& starts, Stage& stage) const {
-    constexpr int most_moves = 3;
-    const bool disagree = fit_.certainty.agree < fit_.certainty.starts;
-    Minimum best = polish(some_, starts_of(starts), finishing_precision(), stage).front();
-    for (int move = 0; disagree && move < most_moves; ++move) {
-      const std::vector<VectorXd> beside = beside_in_alpha(best.x);
-      if (beside.empty()) break;
-      const Minimum next = polish(some_, beside, finishing_precision(), stage).front();
-      if (!(next.true_value < best.true_value)) break;
-      best = next;
-    }
-    return best;
+    const Minimum best = polish(some_, starts_of(starts), finishing_precision(), stage).front();
+    if (fit_.certainty.agree == fit_.certainty.starts) return best;
+    const std::vector<VectorXd> beside = beside_in_alpha(best.x);
+    if (beside.empty()) return best;
+    const Minimum next = polish(some_, beside, finishing_precision(), stage).front();
+    return next.true_value < best.true_value ? next : best;
   }
 
   // Starts whose odds of alpha to 1 - alpha are half and twice those of x; none of a pure lobe.
