@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <sstream>
 #include <utility>
@@ -266,18 +267,30 @@ class Fitter {
     return minimum;
   }
 
+  bool is_linear() const { return options_.norm == Norm::l1 || options_.norm == Norm::cosine_l1; }
+
   // The mean over all bins that a true value stands for.
   double mean_error(double true_value) const {
     const double weight = std::accumulate(all_.weight.begin(), all_.weight.end(), 0.0);
     constexpr double values_of_a_sample = 6;  // three channels, two halves
-    const bool linear = options_.norm == Norm::l1 || options_.norm == Norm::cosine_l1;
-    const double unit = linear ? all_.unit : options_.norm == Norm::l2 ? all_.unit * all_.unit : 1;
+    const double unit = is_linear()                 ? all_.unit
+                        : options_.norm == Norm::l2 ? all_.unit * all_.unit
+                                                    : 1;
     return true_value * unit / (values_of_a_sample * weight);
+  }
+
+  // What a fit leaves over on a subsample is not judged below this: the rounding of stored values.
+  double rounding_of(const Samples& samples) const {
+    constexpr double smoothing = 1;  // which the true value does not have
+    const double single = std::numeric_limits<float>::epsilon();
+    const Objective objective(samples, variables_, options_.norm, smoothing, 1);
+    const double black = objective.evaluate(VectorXd::Zero(variables_.count())).true_value;
+    return black * (is_linear() ? single : single * single);
   }
 
   // A start that held alpha cannot agree unless the optimum is a pure lobe; it counts only then.
   void judge_certainty(const std::vector<Minimum>& sorted) {
-    const double best = sorted.front().true_value;
+    const double best = std::max(sorted.front().true_value, rounding_of(few_));
     const int alpha = variables_.interpolation();
     double worst = best;
     for (const Minimum& m : sorted) {
