@@ -26,7 +26,8 @@ struct Stage {
 };
 
 // How sure the result is: of the `starts` that were polished on a subsample, `agree` ended within
-// 0.5 % of the best; spread is (worst - best) / best.
+// 0.5 % of the best; spread is (worst - best) / best. A best under the rounding of stored values
+// counts as that.
 struct Certainty {
   int starts = 0;
   int agree = 0;

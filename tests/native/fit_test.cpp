@@ -63,6 +63,15 @@ TEST(Fit, FindsAKnownInterpolatedLobe) {
   expect_truth(truth(ModelKind::interpolated, 3000, 1, std::nullopt), "s = 3000, alpha = 1");
 }
 
+// Though one leaves a millionth of the misfit that another leaves: both are rounding.
+TEST(Fit, IsCertainWhereNothingIsLeftOver) {
+  const Parameters known = truth(ModelKind::interpolated, 50, 0.3, 1.5);
+  const Certainty found = fit_of(table_of(known), {}).certainty;
+  EXPECT_GE(found.starts, 3);
+  EXPECT_EQ(found.agree, found.starts);
+  EXPECT_EQ(found.spread, 0);
+}
+
 TEST(Fit, IsAsGoodAsTheTruthUnderNoiseSpikesAndLostBins) {
   const Parameters known = truth(ModelKind::interpolated, 50, 0.3, 1.5);
   const Measurement table = table_of(known);
