@@ -66,6 +66,7 @@ Microfacet microfacet(const ClosureCurves& closures, int closure, const Shape& s
 std::vector<ClippedShape> clipped_shapes(const ClosureCurves& closures, const AtView& at,
                                          double cosine) {
   std::vector<ClippedShape> shapes;
+  shapes.reserve(static_cast<std::size_t>(closures.layout.specular));
   for (int k = 0; k < closures.layout.specular; ++k) {
     shapes.push_back(clipped_shape(at, closures.layout, k, cosine));
   }
@@ -132,13 +133,14 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
                        Eigen::VectorXd::Zero(layout.curves())};
   using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   using Stride = Eigen::OuterStride<ClosureKernelSums::shapes>;
+  const auto shape_of = [](std::ptrdiff_t closure) { return 3 * closure; };
   for (int k = 0; k < layout.specular; ++k) {
     const Eigen::Matrix3d by_k = shape_by_curves(shapes[static_cast<std::size_t>(k)], at.sine);
     const int row = layout.shape(k, 0);
     result.gradient.segment<3>(row) =
-        by_k.transpose() * Eigen::Map<const Eigen::Vector3d>(sums.gradient_x + 3 * k);
+        by_k.transpose() * Eigen::Map<const Eigen::Vector3d>(sums.gradient_x + shape_of(k));
     for (int l = 0; l <= k; ++l) {
-      const Eigen::Map<const RowMajor3, 0, Stride> part(&sums.matrix_xx[3 * k][3 * l]);
+      const Eigen::Map<const RowMajor3, 0, Stride> part(&sums.matrix_xx[shape_of(k)][shape_of(l)]);
       Eigen::Matrix3d whole = part;
       if (k == l) whole = part.selfadjointView<Eigen::Lower>();
       const Eigen::Matrix3d by_l = shape_by_curves(shapes[static_cast<std::size_t>(l)], at.sine);
@@ -146,7 +148,7 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
     }
     for (int c = 0; c < 3; ++c) {
       for (int l = 0; l < layout.closures(); ++l) {
-        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][3 * k]);
+        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][shape_of(k)]);
         result.matrix.block<1, 3>(layout.weight(l, c), row) = input.weights[k][c] * part * by_k;
       }
     }

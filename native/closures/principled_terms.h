@@ -40,10 +40,10 @@ class CoatTable {
 
  private:
   CoatTable();
-  double node(int roughness, int n_wo, int root_ior) const {
+  double node(std::ptrdiff_t roughness, int n_wo, int root_ior) const {
     return values_[static_cast<std::size_t>((roughness * nodes + n_wo) * nodes + root_ior)];
   }
-  std::array<float, nodes * nodes * nodes> values_;
+  std::array<float, std::size_t{nodes} * nodes * nodes> values_;
 };
 
 // The sockets that all channels share, in the form that is fitted: reflectance_root is

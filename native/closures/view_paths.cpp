@@ -27,6 +27,7 @@ double root_of(const SearchTarget& view) { return std::sqrt(view.front().wo.z())
 ViewPaths::ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>& starts,
                      int threads, const Monitor& monitor)
     : threads_(threads) {
+  views_.reserve(views.size());
   for (const SearchView& view : views) views_.push_back({view});
   std::vector<Optima> found(starts.size(), Optima(views_.size()));
   parallel_for(static_cast<int>(starts.size() * views_.size()), threads, [&](int job) {
@@ -151,6 +152,7 @@ std::vector<ClosureCurves> ViewPaths::ways(const OptimaByView& optima) const {
     if (std::find(found.begin(), found.end(), path) == found.end()) found.push_back(path);
   }
   std::vector<ClosureCurves> result;
+  result.reserve(found.size());
   for (const Path& path : found) result.push_back(through(path));
   return result;
 }

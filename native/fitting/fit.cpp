@@ -222,6 +222,7 @@ class Fitter {
   template <typename Start>
   static std::vector<VectorXd> starts_of(const std::vector<Start>& starts) {
     std::vector<VectorXd> points;
+    points.reserve(starts.size());
     for (const Start& start : starts) points.push_back(start.x);
     return points;
   }

@@ -47,6 +47,7 @@ VectorXd inside(const Variables& variables, VectorXd x) {
 void split_strip(const Samples& samples, const std::vector<std::size_t>& strip, int first_block,
                  std::vector<int>& block) {
   std::vector<double> sorted;
+  sorted.reserve(strip.size());
   for (const std::size_t i : strip) sorted.push_back(samples.u_blinn[i]);
   std::sort(sorted.begin(), sorted.end());
   for (const std::size_t i : strip) {

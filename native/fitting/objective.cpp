@@ -174,10 +174,13 @@ Evaluation Objective::pass(const VectorXd& x, Curvature curvature) const {
   ++passes_;
   const Assembly assembly(variables_, x);
   const int groups = assembly.groups(), runs = static_cast<int>(samples_.runs.size());
-  std::vector<KernelSums> sums(static_cast<std::size_t>(runs * groups));
+  const auto place = [groups](std::ptrdiff_t run, int group) {
+    return static_cast<std::size_t>(run * groups + group);
+  };
+  std::vector<KernelSums> sums(place(runs, 0));
   parallel_for(runs, threads_, [&](int r) {
     for (int group = 0; group < groups; ++group) {
-      sums[static_cast<std::size_t>(r * groups + group)] =
+      sums[place(r, group)] =
           run_kernel(assembly.input(samples_, samples_.runs[static_cast<std::size_t>(r)], group,
                                     smoothing_, curvature),
                      kernel_norm(norm_));
@@ -190,7 +193,7 @@ Evaluation Objective::pass(const VectorXd& x, Curvature curvature) const {
   Evaluation result;
   for (int group = 0; group < groups; ++group) {
     KernelSums total{};
-    for (int r = 0; r < runs; ++r) add(total, sums[static_cast<std::size_t>(r * groups + group)]);
+    for (int r = 0; r < runs; ++r) add(total, sums[place(r, group)]);
     result.value += total.value;
     result.true_value += total.true_value;
     assembly.add(total, group, curved, gradient, hessian);

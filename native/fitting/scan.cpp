@@ -32,7 +32,7 @@ double log_exponent_at(int step) {
 struct Grid {
   int interpolations_used, iors_used;
   int columns() const { return interpolations_used * iors_used; }
-  std::size_t point(int a, int e, int step) const {
+  std::size_t point(int a, std::ptrdiff_t e, int step) const {
     return static_cast<std::size_t>((e * interpolations_used + a) * exponent_steps + step);
   }
 };

@@ -10,7 +10,7 @@ namespace lobefit {
 namespace {
 
 // Below so many pixels a guess for the whole is not needed.
-constexpr std::size_t few = 64 * 64;
+constexpr std::size_t few = 4096;
 // Steeper slopes, beyond 84 degrees, are taken for this one: of a height in pixels they tell no
 // more.
 constexpr double least_cosine = 0.1;

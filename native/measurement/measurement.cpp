@@ -39,9 +39,9 @@ BinCounts sift(int h, const Measurement::Rows& rows) {
   BinCounts counts;
   for (int d = 0; d < Measurement::theta_d_bins; ++d) {
     const double along = t.cos_h[h] * t.cos_d[d], across = t.sin_h[h] * t.sin_d[d];
-    double* const red = rows[0] + d * Measurement::phi_d_bins;
-    double* const green = rows[1] + d * Measurement::phi_d_bins;
-    double* const blue = rows[2] + d * Measurement::phi_d_bins;
+    double* const red = rows[0] + Measurement::index(0, d, 0);
+    double* const green = rows[1] + Measurement::index(0, d, 0);
+    double* const blue = rows[2] + Measurement::index(0, d, 0);
     for (int p = 0; p < Measurement::phi_d_bins; ++p) {
       const bool below = along <= across * std::abs(t.cos_phi[p]);
       const bool finite =

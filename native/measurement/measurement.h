@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
@@ -38,9 +39,8 @@ class Measurement {
   static constexpr int phi_d_bins = 180;
   // A model sees phi_d through cos^2 alone: phi_d and 180 deg - phi_d are one of these.
   static constexpr int folded_phi_bins = phi_d_bins / 2;
-  static constexpr int bin_count = theta_h_bins * theta_d_bins * phi_d_bins;
-
-  static constexpr int row_size = theta_d_bins * phi_d_bins;
+  static constexpr std::ptrdiff_t row_size = std::ptrdiff_t{theta_d_bins} * phi_d_bins;
+  static constexpr std::ptrdiff_t bin_count = theta_h_bins * row_size;
 
   // Three rows (red, green, blue) of row_size values in 1/sr: the bins of one theta_h, phi_d
   // running fastest.
@@ -58,7 +58,9 @@ class Measurement {
   // The table of a reflectance given at half-difference angles; bins below the horizon are invalid.
   static Measurement tabulate(const std::function<Rgb(const HalfDifference&)>& reflectance);
 
-  static int index(int h, int d, int p) { return p + phi_d_bins * (d + theta_d_bins * h); }
+  static std::ptrdiff_t index(int h, int d, int p) {
+    return h * row_size + d * std::ptrdiff_t{phi_d_bins} + p;
+  }
   static HalfDifference centre(int h, int d, int p);
 
   // The reflectance of a bin; NaN in all three channels where it is invalid.

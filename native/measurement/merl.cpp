@@ -96,7 +96,7 @@ class RowReader {
     for (int c = 0; c < 3; ++c) {
       for (int d = 0; d < Measurement::theta_d_bins; d += piece_theta_d) {
         read(Measurement::theta_d_bins * (h + Measurement::theta_h_bins * c) + d, piece.data());
-        double* const to = rows[static_cast<std::size_t>(c)] + d * Measurement::phi_d_bins;
+        double* const to = rows[static_cast<std::size_t>(c)] + Measurement::index(0, d, 0);
         for (int i = 0; i < piece_theta_d * Measurement::phi_d_bins; ++i) {
           to[i] = channel_scale[c] * stored(piece.data(), i);
         }
@@ -119,7 +119,8 @@ class RowReader {
   // by reciprocity.
   double stored(const double* piece, int i) const {
     if (phi_bins_ == Measurement::phi_d_bins) return piece[i];
-    const int row = i / Measurement::phi_d_bins, p = i % Measurement::phi_d_bins;
+    const std::ptrdiff_t row = i / Measurement::phi_d_bins;
+    const int p = i % Measurement::phi_d_bins;
     const double* const values = piece + row * double_phi_bins;
     return merged(values[p], values[p + Measurement::phi_d_bins]);
   }

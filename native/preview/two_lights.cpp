@@ -27,11 +27,11 @@ using Shade = std::function<Rgb(const Vector3& normal)>;
 void render_row(const Shade& shade, int size, int row, float* pixels) {
   const auto centre = [size](int index) { return (2 * index + 1.0) / size - 1; };
   const double y = -centre(row);
-  for (int column = 0; column < size; ++column) {
+  for (int column = 0; column < size; ++column, pixels += 3) {
     const double x = centre(column), z2 = 1 - x * x - y * y;
     if (z2 <= 0) continue;
     const Rgb radiance = shade(Vector3(x, y, std::sqrt(z2)));
-    Eigen::Map<Eigen::Array3f>(pixels + 3 * column) = radiance.cast<float>();
+    Eigen::Map<Eigen::Array3f>(pixels) = radiance.cast<float>();
   }
 }
 

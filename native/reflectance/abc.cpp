@@ -161,6 +161,7 @@ Rgb evaluate(const AbcFit& fit, const HalfDifference& point) {
 
 std::vector<std::string_view> sample_names() {
   std::vector<std::string_view> names;
+  names.reserve(abc_fits.size());
   for (const AbcFit& fit : abc_fits) names.push_back(fit.name);
   return names;
 }
