@@ -1,13 +1,11 @@
 """Fits of files or records one after another, each a C++ job; none waits for long or needs bpy."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What became of a file or record: its record, or the sentence why there is none."""
 
     path: str  # of a record its name

@@ -2,7 +2,6 @@
 
 import functools
 import importlib
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -53,7 +52,8 @@ def needed(execute: Callable[[Any, Any], set[str]]) -> Callable[[Any, Any], set[
 
 def own_identity() -> dict[str, str]:
     """The version of the add-on and, where it was packaged, the build it was packaged with."""
-    import tomllib  # later than at Blender's start
+    import json  # later than at Blender's start
+    import tomllib
 
     manifest = tomllib.loads((_HERE / "blender_manifest.toml").read_text(encoding="utf-8"))
     identity = {"version": manifest["version"]}

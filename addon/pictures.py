@@ -3,8 +3,7 @@
 They are there as long as Blender runs, and nothing of them is saved.
 """
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import bpy
 import bpy.utils.previews
@@ -20,8 +19,7 @@ _icons: Any = None  # by the session_uid of a material and the title of the pict
 _kept: dict[tuple[int, str], "Drawn"] = {}  # by the same, but for the title
 
 
-@dataclass(frozen=True)
-class Drawn:
+class Drawn(NamedTuple):
     """Pictures that were drawn together, sRGB with rows from the top, and what is said of them.
 
     A fourth channel is the share of each pixel that is covered.

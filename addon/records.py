@@ -1,7 +1,6 @@
 """Materials and the records they carry, read also where the compiled module cannot be loaded."""
 
 import dataclasses
-import json
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -108,6 +107,8 @@ def _damage(text: str, name: str) -> str:
 
 @lru_cache(maxsize=16)
 def _parsed(text: str) -> dict[str, Any] | None:
+    import json  # later than at Blender's start
+
     try:
         entries = json.loads(text)
     except (ValueError, RecursionError):
@@ -127,6 +128,8 @@ def is_simplified(material: bpy.types.Material) -> bool:
 
 def result_of(scene: bpy.types.Scene) -> dict[str, Any] | None:
     """The last result of simplifying a scene, or None if there is none to be read."""
+    import json
+
     try:
         return json.loads(scene[RESULT_KEY])
     except (KeyError, TypeError, ValueError):

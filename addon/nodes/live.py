@@ -10,8 +10,7 @@ rendering.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -130,8 +129,7 @@ def _add_sockets(group: bpy.types.ShaderNodeTree) -> None:
     add("Conserve Energy", "Float", 0.0)
 
 
-@dataclass
-class _Inputs:
+class _Inputs(NamedTuple):
     base_color: Vector
     specular_color: Vector
     strength: Scalar
@@ -143,8 +141,7 @@ class _Inputs:
     conserve: Scalar
 
 
-@dataclass
-class _View:
+class _View(NamedTuple):
     tangent: Vector
     cosine: Scalar
     sine: Scalar
@@ -153,15 +150,13 @@ class _View:
     tan2: Scalar
 
 
-@dataclass
-class _Fresnel:
+class _Fresnel(NamedTuple):
     value: Scalar
     phi: Scalar
     rise: Scalar
 
 
-@dataclass
-class _Lobe:
+class _Lobe(NamedTuple):
     """The lobe at the peak of its Phong relative, for k_s = 1: see live_lobe.h, step 1."""
 
     tan_tau: Scalar
@@ -173,8 +168,7 @@ class _Lobe:
     wide_rise: Scalar
 
 
-@dataclass
-class _Closure:
+class _Closure(NamedTuple):
     """A Beckmann closure; its weight is 4 pi k_s F amount alpha2."""
 
     inverse_x2: Scalar

@@ -1,8 +1,7 @@
 """A record as a Blender material."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -119,8 +118,7 @@ def add_to_tree(
     return shader.node
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """A kind that is not `auto`, and for a baked one the record's entry it shows."""
 
     kind: str

@@ -1,7 +1,6 @@
 """Finds the measured file of a material again that is no longer where it was."""
 
 import itertools
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -123,6 +122,8 @@ def _is_file_of(path: str, source: dict) -> bool:
 
 
 def _set_path(material: bpy.types.Material, path: str) -> None:
+    import json
+
     record = json.loads(material[KEY])
     record["source"]["path"] = str(Path(path).absolute())
     material[KEY] = json.dumps(record, indent=1, allow_nan=False) + "\n"
