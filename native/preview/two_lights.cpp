@@ -31,7 +31,7 @@ void render_row(const Shade& shade, int size, int row, float* pixels) {
     const double x = centre(column), z2 = 1 - x * x - y * y;
     if (z2 <= 0) continue;
     const Rgb radiance = shade(Vector3(x, y, std::sqrt(z2)));
-    Eigen::Map<Eigen::Array3f>(pixels) = radiance.cast<float>();
+    Eigen::Array3f::Map(pixels) = radiance.cast<float>();
   }
 }
 
