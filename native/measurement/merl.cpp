@@ -92,7 +92,7 @@ class RowReader {
   // What threads read goes through a piece of memory that is small and their own, so that they
   // touch the rows' memory for the first time, which is slow, all at once.
   void operator()(int h, const Measurement::Rows& rows) const {
-    std::array<double, piece_theta_d * double_phi_bins> piece;
+    std::array<double, std::size_t{piece_theta_d} * double_phi_bins> piece;
     for (int c = 0; c < 3; ++c) {
       for (int d = 0; d < Measurement::theta_d_bins; d += piece_theta_d) {
         read(Measurement::theta_d_bins * (h + Measurement::theta_h_bins * c) + d, piece.data());

@@ -423,6 +423,17 @@ py::dict matched_exponent(double exponent, std::optional<double> angle) {
                   "error_of_four"_a = match.error_of_four);
 }
 
+std::pair<std::string, py::dict> named_source(const py::object& source) {
+  try {
+    return source.cast<std::pair<std::string, py::dict>>();
+  } catch (const py::cast_error&) {
+    throw InputError(
+        "source: expected a Measurement, a dict of parameters or a pair of a name and a dict, "
+        "found " +
+        py::type::of(source).attr("__name__").cast<std::string>() + ".");
+  }
+}
+
 // f cos of what a preview can show: a Measurement, a dict of parameters, ("live", parameters),
 // ("principled", its dict), ("classic", its dict) or ("closures", an entry of a record's closures).
 Reflectance previewed(const py::object& source) {
@@ -432,13 +443,13 @@ Reflectance previewed(const py::object& source) {
   if (py::isinstance<py::dict>(source)) {
     return with_cosine(model_reflectance(parameters_from(source.cast<py::dict>())));
   }
-  const auto [kind, dict] = source.cast<std::pair<std::string, py::dict>>();
+  const auto [kind, dict] = named_source(source);
   if (kind == "live") return live_reflectance(parameters_from(dict));
   if (kind == "principled") return principled_reflectance(principled_from(dict));
   if (kind == "closures") return closures_reflectance(closures_from(dict));
   if (kind == "classic") return classic_reflectance(classic_from(dict));
-  throw InputError("preview: expected 'live', 'principled', 'classic' or 'closures', found '" +
-                   kind + "'.");
+  throw InputError("source: expected 'live', 'principled', 'classic' or 'closures', found '" + kind +
+                   "'.");
 }
 
 py::array_t<float> preview(const py::object& source, int size, double world) {

@@ -5,8 +5,15 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import pytest
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "manual" / "examples" / "render_measured.py"
+
+
+def test_without_arguments_the_usage_is_told(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["blender", "--background"])
+    with pytest.raises(SystemExit, match=r"^usage: blender .* -- nickel\.binary nickel\.png$"):
+        runpy.run_path(str(SCRIPT), run_name="__main__")
 
 
 def test_a_file_is_imported_and_rendered(addon, measured_file, tmp_path, monkeypatch):

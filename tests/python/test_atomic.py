@@ -41,6 +41,13 @@ def test_a_full_device_is_named(tmp_path):
         write_bytes(full, b"x")
 
 
+def test_the_name_beside_is_told_nobody(tmp_path):
+    place = tmp_path / "table.binary"
+    with pytest.raises(InputError) as told, written_aside(place) as aside:
+        raise InputError(f"{aside}: cannot be written, so is {aside.name}.")
+    assert str(told.value) == f"{place}: cannot be written, so is table.binary."
+
+
 def test_a_missing_folder_is_named(record, tmp_path):
     place = tmp_path / "none" / "record.json"
     with pytest.raises(InputError, match="cannot be written, its folder does not exist"):

@@ -36,6 +36,13 @@ def test_a_bad_file_ends_it_with_a_sentence(tmp_path):
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", ["fit_and_save.py", "compare_kinds.py"])
+def test_without_arguments_the_usage_is_told(name):
+    done = subprocess.run([sys.executable, str(EXAMPLES / name)], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"usage: python {name} nickel.binary"), done.stderr
+
+
 def test_more_closures_are_closer(table):
     heads, *rows, principled = run("compare_kinds.py", table)
     assert heads == ["kind", "closures", "error", "grazing", "seconds"]

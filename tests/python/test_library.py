@@ -312,6 +312,11 @@ def test_records_of_libraries_and_hidden_files_are_no_input(folder, record):
     assert sorted(assets_of(folder)) == ["chrome.binary", "loose.binary"]
 
 
+def test_what_is_refused_leaves_nothing(tmp_path, capfd):
+    refuse(capfd, "library", tmp_path / "nosuch", "-o", tmp_path / "lib.blend")
+    assert os.listdir(tmp_path) == []
+
+
 def test_catalogues_are_kept_and_extended(tmp_path):
     place = tmp_path / catalogues.FILE
     known = str(uuid.uuid4())

@@ -228,6 +228,19 @@ def test_wrong_use_is_one_sentence(renders, tmp_path, capfd, changed, sentence):
     assert not (tmp_path / "normal.png").exists()
 
 
+def test_a_wrong_source_is_one_sentence():
+    true, lighting = sphere(4), ring()[:1]
+    for source, found in [(5, "int"), (("classic",), "tuple"), ("nickel.binary", "str")]:
+        with pytest.raises(
+            InputError, match=rf"^source: expected a Measurement.* found {found}\.$"
+        ):
+            shade(true, lighting, source)
+        with pytest.raises(InputError, match=rf"^source: .* found {found}\.$"):
+            Job(np.ones((1, 4, 4, 3)), lighting, source, true.any(-1))
+    with pytest.raises(InputError, match=r"^source: expected 'live'.* found 'matte'"):
+        shade(true, lighting, ("matte", {}))
+
+
 def test_no_picture_is_written_over(renders, tmp_path, capfd):
     paths, lights = renders
     before = (tmp_path / "0.exr").read_bytes()

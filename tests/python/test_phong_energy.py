@@ -52,6 +52,19 @@ def test_the_command_prints_the_integral_last(capsys):
     # 17 digits are a double.
     assert figures["integral"] == exact.integral
     assert figures["by_exponent"] == exact.by_exponent
+    assert figures["energy_conserving_factor"] == exact.conserving
+    assert figures["energy_normalised_factor"] == exact.normalising
+
+
+def test_the_command_tells_of_several_exponents(capsys):
+    arguments = ["--model", "phong", "--exponent", "5", "10", "--angle", "30"]
+    assert main(["energy", *arguments, "--json"]) == 0
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [each["exponent"] for each in found] == [5, 10]
+    assert found[1]["integral"] == lobefit.energy("phong", 10.0, 30.0).integral
+    assert main(["energy", *arguments]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [line[1] for line in lines if line[0] == "exponent"] == ["5", "10"]
 
 
 def test_the_command_refuses_what_is_out_of_range(capsys):

@@ -5,6 +5,7 @@ import zlib
 
 import numpy as np
 import pytest
+from commands import refuse
 from lobefit import lettering, picture, preview
 from lobefit.command_line import main
 
@@ -101,6 +102,13 @@ def test_the_preview_of_a_file_fits_it(table, tmp_path):
     options = ["--model", "modified-phong", "--schedule", "stages"]
     assert main(["preview", str(table), *options, "--size", "48", "-o", str(output)]) == 0
     assert read_png(output.read_bytes()).shape[1] > 4 * 48
+
+
+def test_a_preview_is_a_png(record, tmp_path, capfd):
+    record.save(tmp_path / "gold.json")
+    told = refuse(capfd, "preview", tmp_path / "gold.json", "-o", tmp_path / "gold.jpg")
+    assert "gold.jpg: expected a name that ends in .png." in told
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gold.json"]
 
 
 def test_the_preview_of_a_record_without_its_file(record, tmp_path):

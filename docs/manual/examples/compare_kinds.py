@@ -26,4 +26,9 @@ def main(measured: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if len(sys.argv) != 2:
+        sys.exit("usage: python compare_kinds.py nickel.binary")
+    try:
+        main(sys.argv[1])
+    except lobefit.InputError as error:
+        sys.exit(str(error))

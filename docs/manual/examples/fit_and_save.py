@@ -26,6 +26,8 @@ def main(measured: str, output: str) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit("usage: python fit_and_save.py nickel.binary nickel.json")
     try:
         main(*sys.argv[1:])
     except lobefit.InputError as error:

@@ -34,4 +34,8 @@ def main(measured: str, output: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[sys.argv.index("--") + 1 :])
+    arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if len(arguments) != 2:
+        usage = "blender --background --python render_measured.py -- nickel.binary nickel.png"
+        sys.exit(f"usage: {usage}")
+    main(*arguments)

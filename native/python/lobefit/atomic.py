@@ -68,6 +68,10 @@ def written_aside(path: str | os.PathLike[str]) -> Iterator[Path]:
         _flush(aside)
         _remove_abandoned(aside, stem)
         os.replace(aside, place)
+    except InputError as error:
+        # What writes the file beside may name it; who reads of it knows the place alone.
+        told = str(error).replace(str(aside), str(path)).replace(aside.name, place.name)
+        raise InputError(told) from error
     except OSError as error:
         raise InputError(f"{path}: cannot be written, {reason(error)}.") from error
     finally:
@@ -107,6 +111,13 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise InputError(f"{path}: the folder cannot be made, {reason(error)}.") from error
     return folder
+
+
+def remove_empty(folder: str | os.PathLike[str]) -> None:
+    """Removes the folders below `folder` that hold nothing, and itself if nothing is left in it."""
+    for place, _, _ in os.walk(folder, topdown=False):
+        with contextlib.suppress(OSError):
+            os.rmdir(place)
 
 
 def _remove_abandoned(aside: Path, stem: str) -> None:

@@ -38,7 +38,7 @@ from lobefit import (
 )
 from lobefit._native import Cancelled, InputError
 from lobefit.albedo import excess
-from lobefit.atomic import make_folder, place_to_write, reason, write_bytes
+from lobefit.atomic import make_folder, place_to_write, reason, remove_empty, write_bytes
 from lobefit.batch import Batch, Ended, Task, in_processes, on_cluster, tasks_at, tasks_in
 from lobefit.classic import LEAST_EXPONENT, match_exponent
 from lobefit.classic import MOST_EXPONENT as MOST_EXPONENT_TO_MATCH
@@ -486,9 +486,10 @@ def _add_energy(commands: Any) -> None:
     command.add_argument(
         "--exponent",
         type=_within(float, 0, MOST_EXPONENT, "an exponent"),
+        nargs="+",
         required=True,
         metavar="N",
-        help=f"from 0 to {MOST_EXPONENT:g}",
+        help=f"of the lobe, at most {MOST_EXPONENT:g}; several are told one after another",
     )
     command.add_argument(
         "--angle",
@@ -837,7 +838,8 @@ def _records(options: argparse.Namespace, records: list[Record]) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    place_to_write(options.output)
+    if place_to_write(options.output).suffix.lower() != ".png":
+        raise InputError(f"{options.output}: expected a name that ends in .png.")
     records: list[Record] = []
     code = _records(options, records)
     if records:
@@ -881,7 +883,7 @@ def _material(options: argparse.Namespace) -> int:
     record = _record(Path(options.file), options, requests)
     count = options.closures if options.kind in TARGETS else None
     shown, error = blender.write_blend(options.output, record, options.kind, count, tolerance)
-    print(f"{options.output}: {record.name}, {shown}, {error:.1%} of the light is off")
+    print(f"{options.output}: {record.name}, {shown}, {error:.1%} of the reflected light is off")
     if options.kind == "auto" and error > tolerance:
         print(f"   none keeps to {tolerance:g}: this is the nearest")
     return DONE
@@ -908,10 +910,14 @@ def _library(options: argparse.Namespace) -> int:
             told = {"file": str(task.source), "name": record.name, "shown": what, "error": error}
             print(json.dumps(told), flush=True)
         else:
-            print(f"{task.source}: {record.name}, {what}, {error:.1%} of the light is off")
+            off = f"{error:.1%} of the reflected light is off"
+            print(f"{task.source}: {record.name}, {what}, {off}")
 
     bar = progress_lines if options.json else progress_bar
-    code = _run(options, tasks, not options.again, show, part_of(bar, 0.0, 1 - _WRITING))
+    try:
+        code = _run(options, tasks, not options.again, show, part_of(bar, 0.0, 1 - _WRITING))
+    finally:
+        remove_empty(records_folder(options.output))
     contents = [(records[item.place], item.asset) for item in items if item.place in records]
     if contents:
         with part_of(bar, 1 - _WRITING, 1.0)(Path(options.output).name) as progress:
@@ -980,19 +986,22 @@ def _simplify(options: argparse.Namespace) -> int:
 
 
 def _energy(options: argparse.Namespace) -> int:
-    found = energy(options.model, options.exponent, options.angle)
-    figures = {
-        "energy-conserving factor": found.conserving,
-        "energy-normalised factor": found.normalising,
-        "by exponent": found.by_exponent,
-        "by angle": found.by_angle,
-        "integral": found.integral,
-    }
-    if options.json:
-        print(json.dumps({name.replace(" ", "_"): value for name, value in figures.items()}))
-    else:
-        for name, value in figures.items():
-            print(f"{name:24} {value:.17g}")
+    for exponent in options.exponent:
+        found = energy(options.model, exponent, options.angle)
+        figures = {
+            "exponent": exponent,
+            "energy-conserving factor": found.conserving,
+            "energy-normalised factor": found.normalising,
+            "by exponent": found.by_exponent,
+            "by angle": found.by_angle,
+            "integral": found.integral,
+        }
+        if options.json:
+            keys = (name.replace(" ", "_").replace("-", "_") for name in figures)
+            print(json.dumps(dict(zip(keys, figures.values(), strict=True))))
+        else:
+            for name, value in figures.items():
+                print(f"{name:24} {value:.17g}")
     return DONE
 
 

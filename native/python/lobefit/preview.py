@@ -96,7 +96,8 @@ def row(
         captions["rendered"] = f"{_apart(rendered, linear['cycles']):.4f} from the former"
     if measurement:
         linear["difference"] = AMPLIFIED * np.abs(linear["cycles"] - linear["measured"])
-        captions["difference"] = f"{_apart(linear['cycles'], linear['measured']):.3f} of the light"
+        apart = _apart(linear["cycles"], linear["measured"])
+        captions["difference"] = f"{apart:.1%} of the light is off"
     white = picture.white_point(next(iter(linear.values())))
     return Row(
         record.name,
