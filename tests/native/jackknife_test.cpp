@@ -32,7 +32,7 @@ Parameters lobe(double exponent, double alpha, double ior) {
 // all over patches of 3 x 3 steps of theta_h and theta_d, since errors of a measurement go
 // together, and one of every bin by itself. Both are the same in all channels.
 Measurement with_noise(const Measurement& table, double sigma, std::mt19937& random) {
-  constexpr int patch = 3, patches = Measurement::theta_d_bins / patch;
+  constexpr std::ptrdiff_t patch = 3, patches = Measurement::theta_d_bins / patch;
   std::normal_distribution<double> noise(0, sigma);
   std::vector<double> of_patch(static_cast<std::size_t>(patches * patches));
   for (double& value : of_patch) value = noise(random);

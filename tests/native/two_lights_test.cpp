@@ -13,7 +13,7 @@ namespace {
 
 constexpr int size = 65;
 
-Rgb pixel(const std::vector<float>& picture, int row, int column) {
+Rgb pixel(const std::vector<float>& picture, std::ptrdiff_t row, int column) {
   return Eigen::Map<const Eigen::Array3f>(picture.data() + 3 * (row * size + column))
       .cast<double>();
 }
@@ -31,7 +31,7 @@ TEST(TwoLights, ShadesADiffuseSphere) {
   const auto picture = render_two_lights(
       [](const Vector3& wi, const Vector3&) -> Rgb { return Rgb(1, 0.5, 0.25) * wi.z() / pi; },
       size);
-  ASSERT_EQ(picture.size(), static_cast<std::size_t>(3 * size * size));
+  ASSERT_EQ(picture.size(), std::size_t{3} * size * size);
   for (const auto& [row, column] : {std::pair(32, 32), {10, 50}, {55, 10}, {20, 8}, {60, 40}}) {
     const Vector3 n = normal(row, column);
     const double light = std::max(0.0, n.dot(glancing)) + std::max(0.0, n.dot(grazing));
