@@ -448,8 +448,8 @@ Reflectance previewed(const py::object& source) {
   if (kind == "principled") return principled_reflectance(principled_from(dict));
   if (kind == "closures") return closures_reflectance(closures_from(dict));
   if (kind == "classic") return classic_reflectance(classic_from(dict));
-  throw InputError("source: expected 'live', 'principled', 'classic' or 'closures', found '" + kind +
-                   "'.");
+  throw InputError("source: expected 'live', 'principled', 'classic' or 'closures', found '" +
+                   kind + "'.");
 }
 
 py::array_t<float> preview(const py::object& source, int size, double world) {

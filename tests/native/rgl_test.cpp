@@ -149,6 +149,7 @@ TEST(RglMeasurement, ColoursBeyondTheGamutAreClipped) {
 
 std::vector<float> range(float first, float last, int count) {
   std::vector<float> values;
+  values.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     values.push_back(first +
                      (last - first) * static_cast<float>(i) / static_cast<float>(count - 1));
