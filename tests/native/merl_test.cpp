@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "measurement/input_error.h"
+#include "measurement/input_file.h"
 #include "measurement/read_measurement.h"
 #include "reflectance/abc.h"
 
@@ -191,6 +192,25 @@ TEST_F(Merl, RefusesEveryShorterHead) {
     std::ofstream(path(), std::ios::binary) << std::string(bytes, 'Z');
     EXPECT_NE(sentence(path()).find("expected a MERL table"), std::string::npos);
   }
+}
+
+TEST_F(Merl, AFileThatIsCutWhileItIsReadIsNamed) {
+  const InputFile open(file({90, 90, 180}, 100));
+  fs::resize_file(path(), 400);
+  std::vector<double> values(50);
+  open.read(12, values.data(), 48 * sizeof(double));
+  try {
+    open.read(12, values.data(), 49 * sizeof(double));
+    FAIL() << "read without complaint";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.what(), path().string() +
+                                ": expected 812 bytes, found its end earlier; did the file change "
+                                "while it was read?");
+  }
+}
+
+TEST_F(Merl, WhatIsNoFileIsNamed) {
+  EXPECT_NE(sentence("/dev/null").find("found something that is not a file"), std::string::npos);
 }
 
 }  // namespace
