@@ -10,22 +10,24 @@ namespace lobefit {
 
 inline constexpr int most_specular_closures = 3;
 
-// What is known of each light, see TargetLight, and what its closures are compared with.
+// What is known of each light, see TargetLight, in its columns by SearchLights, and what its
+// closures are compared with.
+template <typename Scalar>
 struct ClosureKernelInput {
   std::size_t count;  // a multiple of closure_kernel_lanes
-  const double* wi[3];
-  const double* half[3];
-  const double* reflected[3];
-  const double* weight;
-  const double* typical;
+  const Scalar* wi[3];
+  const Scalar* half[3];
+  const Scalar* reflected[3];  // by what is typical there
+  const Scalar* weight;        // of a difference as large as what is typical
+  const Scalar* inverse_typical;
 
   int specular;
-  MicrofacetTerms closures[most_specular_closures];
-  double weights[most_specular_closures + 1][3];  // the diffuse closure's after the specular ones'
-  double smoothing;                               // |r| is rounded off below so many times typical
+  MicrofacetTermsOf<Scalar> closures[most_specular_closures];
+  Scalar weights[most_specular_closures + 1][3];  // the diffuse closure's after the specular ones'
+  Scalar smoothing;                               // |r| is rounded off below so many times typical
 };
 
-inline constexpr std::size_t closure_kernel_lanes = 4;
+inline constexpr std::size_t closure_kernel_lanes = 8;
 
 // Sums over the lights, from which gradient J'Wr and the matrix J'WJ of reweighted least squares
 // follow, with W = weight / |r| rounded off. v_k is what closure k reflects per weight, and x its
@@ -41,9 +43,10 @@ struct ClosureKernelSums {
   double matrix_xx[shapes][shapes];  // W df/dx df/dx, summed over the channels
 };
 
-// Both for at most most_specular_closures.
-ClosureKernelSums run_closure_kernel(const ClosureKernelInput& input);
+// All for at most most_specular_closures. A step toward less error needs no double precision.
+ClosureKernelSums run_closure_kernel(const ClosureKernelInput<float>& input);
 // The sum of weight times |r|, rounded off.
-double run_closure_error(const ClosureKernelInput& input);
+double run_closure_error(const ClosureKernelInput<float>& input);
+double run_closure_error(const ClosureKernelInput<double>& input);
 
 }  // namespace lobefit

@@ -7,11 +7,17 @@
 
 namespace lobefit {
 
-ClosureKernelSums run_closure_kernel_avx2(const ClosureKernelInput& input) {
+ClosureKernelSums run_closure_kernel_avx2(const ClosureKernelInput<float>& input) {
   return sum_closures(input);
 }
 
-double run_closure_error_avx2(const ClosureKernelInput& input) { return error_of_closures(input); }
+double run_closure_error_avx2(const ClosureKernelInput<float>& input) {
+  return error_of_closures(input);
+}
+
+double run_closure_error_avx2(const ClosureKernelInput<double>& input) {
+  return error_of_closures(input);
+}
 
 }  // namespace lobefit
 

@@ -6,7 +6,8 @@
 
 namespace lobefit {
 
-ClosureKernelSums run_closure_kernel_avx2(const ClosureKernelInput& input);
-double run_closure_error_avx2(const ClosureKernelInput& input);
+ClosureKernelSums run_closure_kernel_avx2(const ClosureKernelInput<float>& input);
+double run_closure_error_avx2(const ClosureKernelInput<float>& input);
+double run_closure_error_avx2(const ClosureKernelInput<double>& input);
 
 }  // namespace lobefit

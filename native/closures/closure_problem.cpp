@@ -1,6 +1,7 @@
 #include "closures/closure_problem.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "closures/band_matrix.h"
@@ -15,26 +16,18 @@ using enum ClosureLayout::ShapeCurve;
 // loses the peak of a lobe much narrower than this.
 const double least_log_alpha = std::log(0.002);
 
-// The values of all curves at one view angle.
-struct AtView {
-  Eigen::VectorXd curves;
-  double sine;
-};
+// Sums and equations of a view need no memory from the system.
+constexpr int most_curves = 3 * most_specular_closures + 3 * (most_specular_closures + 1);
+using CurveVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_curves, 1>;
+using CurveMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_curves, most_curves>;
 
-AtView at_view(const ClosureCurves& closures, double cosine) {
-  const auto [first, share] = ViewSplines::at(cosine, closures.coefficients());
-  return {closures.x.middleCols(first, share.size()) * share,
-          std::sqrt(std::max(0.0, 1 - cosine * cosine))};
-}
-
-// How far a closure may be bent at a view angle. Cycles bends a normal back whose mirror direction
-// of the viewer is not clear of the horizon: its height has to be .01, or .9 of the viewer's own.
-double least_tilt(double cosine) {
+// Cycles bends a normal back whose mirror direction of the viewer is not clear of the horizon: its
+// height has to be .01, or .9 of the viewer's own.
+double least_tilt_at(double cosine) {
   const double least_height = std::min(0.9 * cosine, 0.0105);
   return -std::tan((std::asin(cosine) - std::asin(least_height)) / 2);
 }
-// No bend reaches the viewer itself.
-double greatest_tilt(double cosine, double sine) { return 0.8 * sine / cosine; }
 
 // A shape within what Cycles can show, and which of its numbers were clipped.
 struct ClippedShape {
@@ -42,11 +35,17 @@ struct ClippedShape {
   bool x_free, y_free, tilt_free;
 };
 
-ClippedShape clipped_shape(const AtView& at, const ClosureLayout& layout, int closure,
-                           double cosine) {
-  const double m = at.curves[layout.shape(closure, mean)];
-  const double h = at.curves[layout.shape(closure, spread)] * at.sine * at.sine;
-  const double t = at.curves[layout.shape(closure, bend)] * at.sine;
+// The values of all curves at one view angle, and the shapes that they stand for.
+struct AtView {
+  CurveVector curves;
+  std::array<ClippedShape, most_specular_closures> shapes;
+};
+
+ClippedShape clipped_shape(const CurveVector& curves, const ClosureLayout& layout, int closure,
+                           const ViewAngle& angle) {
+  const double m = curves[layout.shape(closure, mean)];
+  const double h = curves[layout.shape(closure, spread)] * angle.sine * angle.sine;
+  const double t = curves[layout.shape(closure, bend)] * angle.sine;
   const auto clip = [](double value, double low, double high, bool& free) {
     free = value > low && value < high;
     return std::clamp(value, low, high);
@@ -54,55 +53,49 @@ ClippedShape clipped_shape(const AtView& at, const ClosureLayout& layout, int cl
   ClippedShape result;
   result.shape.log_alpha_x = clip(m - h, least_log_alpha, 0, result.x_free);
   result.shape.log_alpha_y = clip(m + h, least_log_alpha, 0, result.y_free);
-  result.shape.tilt = clip(t, least_tilt(cosine), greatest_tilt(cosine, at.sine), result.tilt_free);
+  result.shape.tilt = clip(t, angle.least_tilt, angle.greatest_tilt, result.tilt_free);
   return result;
 }
 
-Microfacet microfacet(const ClosureCurves& closures, int closure, const Shape& shape,
-                      const Vector3& wo) {
-  return {closures.distributions[static_cast<std::size_t>(closure)], shape, wo};
-}
-
-std::vector<ClippedShape> clipped_shapes(const ClosureCurves& closures, const AtView& at,
-                                         double cosine) {
-  std::vector<ClippedShape> shapes;
-  shapes.reserve(static_cast<std::size_t>(closures.layout.specular));
+AtView at_view(const ClosureCurves& closures, const ViewAngle& angle) {
+  const auto [first, share] = ViewSplines::at(angle.cosine, closures.coefficients());
+  AtView at{closures.x.middleCols(first, share.size()).lazyProduct(share), {}};
   for (int k = 0; k < closures.layout.specular; ++k) {
-    shapes.push_back(clipped_shape(at, closures.layout, k, cosine));
+    at.shapes[static_cast<std::size_t>(k)] = clipped_shape(at.curves, closures.layout, k, angle);
   }
-  return shapes;
+  return at;
 }
 
-ClosureKernelInput kernel_input(const ClosureCurves& closures, const SearchView& view,
-                                const AtView& at, const std::vector<ClippedShape>& shapes,
-                                double smoothing) {
+Microfacet microfacet(const ClosureCurves& closures, const AtView& at, int closure,
+                      const Vector3& wo) {
+  const auto k = static_cast<std::size_t>(closure);
+  return {closures.distributions[k], at.shapes[k].shape, wo};
+}
+
+template <typename Scalar>
+ClosureKernelInput<Scalar> kernel_input(const ClosureCurves& closures, const AtView& at,
+                                        const Vector3& wo, const SearchView::Lights<Scalar>& lights,
+                                        double smoothing) {
   const ClosureLayout& layout = closures.layout;
-  const auto column = [&](int which) { return view.lights.col(which).data(); };
-  ClosureKernelInput input{};
-  input.count = static_cast<std::size_t>(view.lights.rows());
+  const auto column = [&](int which) { return lights.col(which).data(); };
+  ClosureKernelInput<Scalar> input{};
+  input.count = static_cast<std::size_t>(lights.rows());
   for (int c = 0; c < 3; ++c) {
     input.wi[c] = column(SearchView::wi_x + c);
     input.half[c] = column(SearchView::half_x + c);
     input.reflected[c] = column(SearchView::red + c);
     for (int k = 0; k < layout.closures(); ++k) {
-      input.weights[k][c] = at.curves[layout.weight(k, c)];
+      input.weights[k][c] = static_cast<Scalar>(at.curves[layout.weight(k, c)]);
     }
   }
   input.weight = column(SearchView::weight);
-  input.typical = column(SearchView::typical);
+  input.inverse_typical = column(SearchView::inverse_typical);
   input.specular = layout.specular;
   for (int k = 0; k < layout.specular; ++k) {
-    const Shape& shape = shapes[static_cast<std::size_t>(k)].shape;
-    input.closures[k] = microfacet(closures, k, shape, view.wo).terms();
+    input.closures[k] = microfacet(closures, at, k, wo).terms().as<Scalar>();
   }
-  input.smoothing = smoothing;
+  input.smoothing = static_cast<Scalar>(smoothing);
   return input;
-}
-
-double view_error(const ClosureCurves& closures, const SearchView& view, double smoothing) {
-  const AtView at = at_view(closures, view.wo.z());
-  const std::vector<ClippedShape> shapes = clipped_shapes(closures, at, view.wo.z());
-  return run_closure_error(kernel_input(closures, view, at, shapes, smoothing));
 }
 
 // How a closure's ln alpha_x, ln alpha_y and tilt follow its mean, spread and bend; 0 where they
@@ -116,26 +109,30 @@ Eigen::Matrix3d shape_by_curves(const ClippedShape& shape, double sine) {
   return by;
 }
 
-// Gradient and reweighted least squares' matrix of view_error by the curves' values at the view.
+// Gradient and reweighted least squares' matrix of the error at a view by the curves' values there;
+// of the matrix the lower half.
 struct ViewEquations {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd gradient;
+  CurveMatrix matrix;
+  CurveVector gradient;
 };
 
 ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& view,
                              double smoothing) {
   const ClosureLayout& layout = closures.layout;
-  const AtView at = at_view(closures, view.wo.z());
-  const std::vector<ClippedShape> shapes = clipped_shapes(closures, at, view.wo.z());
-  const ClosureKernelInput input = kernel_input(closures, view, at, shapes, smoothing);
+  const AtView at = at_view(closures, view.angle);
+  const auto input = kernel_input(closures, at, view.wo, view.singles, smoothing);
   const ClosureKernelSums sums = run_closure_kernel(input);
-  ViewEquations result{Eigen::MatrixXd::Zero(layout.curves(), layout.curves()),
-                       Eigen::VectorXd::Zero(layout.curves())};
+  ViewEquations result{CurveMatrix::Zero(layout.curves(), layout.curves()),
+                       CurveVector::Zero(layout.curves())};
+  std::array<Eigen::Matrix3d, most_specular_closures> by;
+  for (std::size_t k = 0; k < by.size(); ++k) {
+    by[k] = shape_by_curves(at.shapes[k], view.angle.sine);
+  }
   using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   using Stride = Eigen::OuterStride<ClosureKernelSums::shapes>;
   const auto shape_of = [](std::ptrdiff_t closure) { return 3 * closure; };
   for (int k = 0; k < layout.specular; ++k) {
-    const Eigen::Matrix3d by_k = shape_by_curves(shapes[static_cast<std::size_t>(k)], at.sine);
+    const Eigen::Matrix3d& by_k = by[static_cast<std::size_t>(k)];
     const int row = layout.shape(k, 0);
     result.gradient.segment<3>(row) =
         by_k.transpose() * Eigen::Map<const Eigen::Vector3d>(sums.gradient_x + shape_of(k));
@@ -143,13 +140,14 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
       const Eigen::Map<const RowMajor3, 0, Stride> part(&sums.matrix_xx[shape_of(k)][shape_of(l)]);
       Eigen::Matrix3d whole = part;
       if (k == l) whole = part.selfadjointView<Eigen::Lower>();
-      const Eigen::Matrix3d by_l = shape_by_curves(shapes[static_cast<std::size_t>(l)], at.sine);
-      result.matrix.block<3, 3>(row, layout.shape(l, 0)) = by_k.transpose() * whole * by_l;
+      result.matrix.block<3, 3>(row, layout.shape(l, 0)) =
+          by_k.transpose() * whole * by[static_cast<std::size_t>(l)];
     }
     for (int c = 0; c < 3; ++c) {
       for (int l = 0; l < layout.closures(); ++l) {
-        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][shape_of(k)]);
-        result.matrix.block<1, 3>(layout.weight(l, c), row) = input.weights[k][c] * part * by_k;
+        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][3 * k]);
+        result.matrix.block<1, 3>(layout.weight(l, c), row) =
+            at.curves[layout.weight(k, c)] * part * by_k;
       }
     }
   }
@@ -161,7 +159,6 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
       }
     }
   }
-  result.matrix.triangularView<Eigen::StrictlyUpper>() = result.matrix.transpose();
   return result;
 }
 
@@ -183,6 +180,18 @@ Eigen::MatrixXd second_differences(const Eigen::MatrixXd& x) {
 double stiffness_penalty(const ClosureCurves& closures) {
   const int n = closures.coefficients();
   return n < 3 ? 0 : stiffness_of(n) / 2 * second_differences(closures.x).squaredNorm();
+}
+
+// The error of a target's lights, in double or single precision, and the penalty.
+template <typename Scalar>
+double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchView::*lights,
+                const ClosureCurves& closures, double smoothing) {
+  double sum = 0;
+  for (const SearchView& view : target) {
+    const AtView at = at_view(closures, view.angle);
+    sum += run_closure_error(kernel_input(closures, at, view.wo, view.*lights, smoothing));
+  }
+  return sum + stiffness_penalty(closures);
 }
 
 // The unknowns stand coefficient after coefficient, so that each meets those of three coefficients
@@ -211,35 +220,77 @@ void add_penalty(const ClosureCurves& closures, Equations& equations) {
   }
 }
 
-// Adds a view's equations to the coefficients of its splines.
-void add_view(const ViewEquations& part, const ViewSplines::Support& support,
-              Equations& equations) {
-  const Eigen::Index curves = part.gradient.size();
-  for (Eigen::Index b = 0; b < support.share.size(); ++b) {
-    const Eigen::Index column = (support.first + b) * curves;
-    equations.gradient.segment(column, curves) += support.share[b] * part.gradient;
-    for (Eigen::Index a = b; a < support.share.size(); ++a) {
-      const Eigen::Index row = (support.first + a) * curves;
-      const double share = support.share[a] * support.share[b];
-      for (Eigen::Index q = 0; q < curves; ++q) {
-        for (Eigen::Index p = a == b ? q : 0; p < curves; ++p) {
-          equations.matrix(row + p, column + q) += share * part.matrix(p, q);
+// Views next to each other have the same splines. Their equations are added up first, once for
+// each pair of these, the lower half of each matrix in one column: so the large matrix is reached
+// once for all of them.
+class SplineSums {
+ public:
+  SplineSums(Eigen::Index curves, Equations& equations) : curves_(curves), equations_(equations) {}
+
+  void add(const ViewEquations& part, const ViewSplines::Support& support) {
+    if (support.first != first_) begin(support);
+    Packed packed(matrices_.rows());
+    for (Eigen::Index q = 0, to = 0; q < curves_; to += curves_ - q++) {
+      packed.segment(to, curves_ - q) = part.matrix.col(q).tail(curves_ - q);
+    }
+    for (Eigen::Index b = 0, pair = 0; b < support.share.size(); ++b) {
+      gradients_.col(b) += support.share[b] * part.gradient;
+      for (Eigen::Index a = b; a < support.share.size(); ++a) {
+        matrices_.col(pair++) += support.share[a] * support.share[b] * packed;
+      }
+    }
+  }
+
+  // Hands the sums over.
+  void end() {
+    for (Eigen::Index b = 0, pair = 0; b < gradients_.cols(); ++b) {
+      const Eigen::Index column = (first_ + b) * curves_;
+      equations_.gradient.segment(column, curves_) += gradients_.col(b);
+      for (Eigen::Index a = b; a < gradients_.cols(); ++a, ++pair) {
+        for (Eigen::Index q = 0, from = 0; q < curves_; from += curves_ - q++) {
+          const auto part = matrices_.col(pair).segment(from, curves_ - q);
+          const Eigen::Index row = (first_ + a) * curves_ + q;
+          equations_.matrix.below(row, column + q, curves_ - q) += part;
+          if (a == b) continue;
+          for (Eigen::Index p = 1; p < curves_ - q; ++p) {
+            equations_.matrix(row, column + q + p) += part[p];
+          }
         }
       }
     }
   }
-}
 
-Equations linearise(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {
+ private:
+  static constexpr int most_packed = most_curves * (most_curves + 1) / 2;
+  using Packed = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_packed, 1>;
+
+  void begin(const ViewSplines::Support& support) {
+    end();
+    first_ = support.first;
+    const Eigen::Index splines = support.share.size();
+    gradients_.setZero(curves_, splines);
+    matrices_.setZero(curves_ * (curves_ + 1) / 2, splines * (splines + 1) / 2);
+  }
+
+  const Eigen::Index curves_;
+  Equations& equations_;
+  Eigen::Index first_ = -1;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_curves, 4> gradients_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_packed, 10> matrices_;
+};
+
+void linearise(const SearchTarget& target, const ClosureCurves& closures, double smoothing,
+               Equations& equations) {
   const Eigen::Index curves = closures.x.rows();
   const int n = closures.coefficients();
-  Equations sum{BandMatrix(closures.x.size(), std::min(n, 4) * curves - 1),
-                Eigen::VectorXd::Zero(closures.x.size())};
+  equations.matrix.reset(closures.x.size(), std::min(n, 4) * curves - 1);
+  equations.gradient.setZero(closures.x.size());
+  SplineSums sums(curves, equations);
   for (const SearchView& view : target) {
-    add_view(linearise_view(closures, view, smoothing), ViewSplines::at(view.wo.z(), n), sum);
+    sums.add(linearise_view(closures, view, smoothing), ViewSplines::at(view.angle.cosine, n));
   }
-  add_penalty(closures, sum);
-  return sum;
+  sums.end();
+  add_penalty(closures, equations);
 }
 
 struct Bounds {
@@ -256,10 +307,10 @@ Bounds bounds_of(const ClosureLayout& layout) {
   return bounds;
 }
 
-// A damped step within the bounds. An unknown at its bound stays there while the error falls
-// outward.
+// A damped step within the bounds, with a matrix to work in. An unknown at its bound stays there
+// while the error falls outward.
 Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
-                          const Equations& equations, double damping) {
+                          const Equations& equations, double damping, BandMatrix& matrix) {
   const Eigen::Index curves = x.rows();
   std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
@@ -275,7 +326,7 @@ Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
     scale[i] = 1 / std::sqrt(equations.matrix(at, at));
   }
   const Eigen::Index band = equations.matrix.band();
-  BandMatrix matrix(count, band);
+  matrix.reset(count, band);
   for (Eigen::Index j = 0; j < count; ++j) {
     const Eigen::Index column = free[static_cast<std::size_t>(j)];
     for (Eigen::Index i = j; i < count; ++i) {
@@ -297,17 +348,28 @@ Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
 
 }  // namespace
 
-SearchView::SearchView(const TargetView& view) : wo(view.wo) {
+ViewAngle::ViewAngle(double of_cosine)
+    : cosine(of_cosine),
+      sine(std::sqrt(std::max(0.0, 1 - cosine * cosine))),
+      least_tilt(least_tilt_at(cosine)),
+      // No bend reaches the viewer itself.
+      greatest_tilt(0.8 * sine / cosine) {}
+
+SearchView::SearchView(const TargetView& view) : wo(view.wo), angle(wo.z()) {
   constexpr std::size_t at_once = closure_kernel_lanes;
+  // What is so many times brighter than its surroundings is a fault of the target.
+  constexpr double brightest = 1e15;
   const std::size_t count = (view.lights.size() + at_once - 1) / at_once * at_once;
   lights.resize(static_cast<Eigen::Index>(count), columns);
   for (std::size_t i = 0; i < count; ++i) {
     const bool padding = i >= view.lights.size();
     const TargetLight& light = view.lights[padding ? 0 : i];
+    const Rgb reflected = light.reflected / light.typical;
     lights.row(static_cast<Eigen::Index>(i)) << light.wi.transpose().array(),
-        light.half.transpose().array(), light.reflected.transpose(), padding ? 0 : light.weight,
-        light.typical;
+        light.half.transpose().array(), reflected.cwiseMin(brightest).transpose(),
+        padding ? 0 : light.weight * light.typical, 1 / light.typical;
   }
+  singles = lights.cast<float>();
 }
 
 SearchTarget in_columns(const Target& target) { return {target.begin(), target.end()}; }
@@ -322,23 +384,22 @@ ClosureCurves subdivided(const ClosureCurves& closures) {
 }
 
 ClosureCurves constant_at(const ClosureCurves& closures, double cosine) {
-  return {closures.layout, closures.distributions, at_view(closures, cosine).curves};
+  return {closures.layout, closures.distributions, at_view(closures, ViewAngle(cosine)).curves};
 }
 
 Shape shape_at(const ClosureCurves& closures, int closure, double cosine) {
-  return clipped_shape(at_view(closures, cosine), closures.layout, closure, cosine).shape;
+  return at_view(closures, ViewAngle(cosine)).shapes[static_cast<std::size_t>(closure)].shape;
 }
 
 Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures) {
   const ClosureLayout& layout = closures.layout;
-  const AtView at = at_view(closures, view.wo.z());
+  const AtView at = at_view(closures, view.angle);
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(layout.specular);
   for (int k = 0; k < layout.specular; ++k) {
-    const Shape shape = clipped_shape(at, layout, k, view.wo.z()).shape;
-    const Microfacet closure = microfacet(closures, k, shape, view.wo);
+    const Microfacet closure = microfacet(closures, at, k, view.wo);
     for (Eigen::Index i = 0; i < view.lights.rows(); ++i) {
       const auto light = view.lights.row(i).matrix();
-      sum[k] += light[SearchView::weight] *
+      sum[k] += light[SearchView::weight] * light[SearchView::inverse_typical] *
                 closure.evaluate(light.segment<3>(SearchView::wi_x).transpose(),
                                  light.segment<3>(SearchView::half_x).transpose());
     }
@@ -348,23 +409,26 @@ Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& c
 }
 
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {
-  double sum = 0;
-  for (const SearchView& view : target) sum += view_error(closures, view, smoothing);
-  return sum + stiffness_penalty(closures);
+  return error_in(target, &SearchView::lights, closures, smoothing);
 }
 
 ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double smoothing,
                       int iterations, const Monitor& monitor) {
   const Bounds bounds = bounds_of(closures.layout);
-  double error = smooth_error(target, closures, smoothing), damping = 1e-3;
+  const auto error_of = [&](const ClosureCurves& of) {
+    return error_in(target, &SearchView::singles, of, smoothing);
+  };
+  double error = error_of(closures), damping = 1e-3;
   ClosureCurves tried = closures;
+  Equations equations;
+  BandMatrix matrix;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     monitor.throw_if_cancelled();
-    const Equations equations = linearise(target, closures, smoothing);
+    linearise(target, closures, smoothing, equations);
     const double before = error;
     for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
-      tried.x = step_from(closures.x, bounds, equations, damping);
-      const double tried_error = smooth_error(target, tried, smoothing);
+      tried.x = step_from(closures.x, bounds, equations, damping, matrix);
+      const double tried_error = error_of(tried);
       const bool better = tried_error < error;
       if (better) {
         closures.x = tried.x;

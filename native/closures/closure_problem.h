@@ -11,8 +11,18 @@
 
 namespace lobefit {
 
+// What a view angle alone decides.
+struct ViewAngle {
+  explicit ViewAngle(double cosine);
+
+  double cosine, sine;
+  double least_tilt, greatest_tilt;  // how far a closure may be bent
+};
+
 // A view of a target as the search reads it: its lights in columns, padded by lights of no weight
-// to a multiple of what the kernel takes at once.
+// to a multiple of what the kernel takes at once. What they reflect is by what is typical there,
+// and their weight is that of a difference so large: so single precision has the range for any
+// target.
 struct SearchView {
   enum Column {
     wi_x,
@@ -25,14 +35,18 @@ struct SearchView {
     green,
     blue,
     weight,
-    typical,
+    inverse_typical,
     columns
   };
+  template <typename Scalar>
+  using Lights = Eigen::Array<Scalar, Eigen::Dynamic, columns>;
 
   explicit SearchView(const TargetView& view);
 
   Vector3 wo;
-  Eigen::Array<double, Eigen::Dynamic, columns> lights;
+  ViewAngle angle;
+  Lights<double> lights;
+  Lights<float> singles;  // the same in single precision
 };
 
 using SearchTarget = std::vector<SearchView>;

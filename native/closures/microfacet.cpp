@@ -43,14 +43,23 @@ Microfacet::Microfacet(Distribution distribution, const Shape& shape, const Vect
   if (!(above > 0)) return;
   m.scale = std::sqrt(m.stretch2 * m.inverse_x2 * m.inverse_y2) / (4 * pi * above);
   m.scale_by_tilt = m.tilt_by_stretch2 - wo.x() / above;
-  m.slope_o = slope(m, Direction<double>{wo.x(), wo.y(), wo.z()}, above);
-  m.masking_o = masking(distribution, m.slope_o.value);
+  if (distribution == Distribution::beckmann) {
+    m.scale *= square(m.stretch2);
+    m.scale_by_tilt += 4 * m.tilt_by_stretch2;
+  }
+  const ByShape<double> masked = masked_height<true, double>(
+      distribution, elevation(m, Direction<double>{wo.x(), wo.y(), wo.z()}, above));
+  m.masking_o = {masked.value / above, masked.by_log_alpha_x / above, masked.by_log_alpha_y / above,
+                 (masked.by_tilt - masked.value * wo.x() / above) / above};
 }
 
 double Microfacet::visible(const Vector3& wi) const {
-  const double above = wi.z() + terms_.tilt * wi.x();
-  const double slope_i = slope(terms_, Direction<double>{wi.x(), wi.y(), wi.z()}, above).value;
-  return 1 / (masking(terms_.distribution, slope_i).value + terms_.masking_o.value);
+  const double height = std::abs(wi.z() + terms_.tilt * wi.x());
+  const double masked =
+      masked_height<false, double>(
+          terms_.distribution, elevation(terms_, Direction<double>{wi.x(), wi.y(), wi.z()}, height))
+          .value;
+  return height / (masked + terms_.masking_o.value * height);
 }
 
 double Microfacet::evaluate(const Vector3& wi, const Vector3& half) const {

@@ -6,35 +6,43 @@ namespace lobefit {
 
 enum class Distribution { ggx, beckmann };
 
-// Smith's slopes (alpha tan theta)^2 of a direction, and their derivatives.
+// An amount, and its derivatives by the shape of a closure.
 template <typename Number>
-struct MaskingSlope {
-  Number value, by_log_alpha_x, by_log_alpha_y, by_tilt;
-};
-
-// What masking adds for a direction, and its derivative by the slope.
-template <typename Number>
-struct Masking {
-  Number value, by_slope;
-};
-
-// f cos(theta_i) in 1/sr, and the derivatives of its logarithm.
-template <typename Number>
-struct ClosureValue {
+struct ByShape {
   Number value{}, by_log_alpha_x{}, by_log_alpha_y{}, by_tilt{};
 };
 
-struct MicrofacetTerms {
+// In single precision or in double.
+template <typename Scalar>
+struct MicrofacetTermsOf {
   Distribution distribution;
-  double tilt;
-  double stretch2;  // 1 + tilt^2, the squared length of n + tilt x
-  double inverse_stretch2, tilt_by_stretch2;
-  double alpha_x2, alpha_y2;
-  double inverse_x2, inverse_y2;
-  double scale;          // all factors that do not depend on the light; 0 of a viewer below
-  double scale_by_tilt;  // derivative of its logarithm
-  MaskingSlope<double> slope_o;
-  Masking<double> masking_o;
+  Scalar tilt;
+  Scalar stretch2;  // 1 + tilt^2, the squared length of n + tilt x
+  Scalar inverse_stretch2, tilt_by_stretch2;
+  Scalar alpha_x2, alpha_y2;
+  Scalar inverse_x2, inverse_y2;
+  Scalar scale;               // all factors that do not depend on the light; 0 of a viewer below
+  Scalar scale_by_tilt;       // derivative of its logarithm
+  ByShape<Scalar> masking_o;  // what masking adds for the viewer
+
+  template <typename Other>
+  MicrofacetTermsOf<Other> as() const {
+    const auto in = [](Scalar v) { return static_cast<Other>(v); };
+    return {distribution,
+            in(tilt),
+            in(stretch2),
+            in(inverse_stretch2),
+            in(tilt_by_stretch2),
+            in(alpha_x2),
+            in(alpha_y2),
+            in(inverse_x2),
+            in(inverse_y2),
+            in(scale),
+            in(scale_by_tilt),
+            {in(masking_o.value), in(masking_o.by_log_alpha_x), in(masking_o.by_log_alpha_y),
+             in(masking_o.by_tilt)}};
+  }
 };
+using MicrofacetTerms = MicrofacetTermsOf<double>;
 
 }  // namespace lobefit
