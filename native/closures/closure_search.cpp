@@ -102,10 +102,14 @@ std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
   return all;
 }
 
+// How many of what was found with few splines go on with many.
+constexpr std::size_t promising = 3;
+
 class Search {
  public:
   Search(const Target& target, int threads, Monitor& monitor)
       : full_(in_columns(target)),
+        large_(in_columns(thinned(target, 1, 2))),
         medium_(in_columns(thinned(target, 6, 2))),
         small_{in_columns(thinned(target, 9, 5, 0)), in_columns(thinned(target, 9, 5, 1))},
         threads_(threads),
@@ -120,8 +124,8 @@ class Search {
     const double begun = starts.empty() ? 0 : 0.25;
     const std::vector<ViewPaths> paths = look_for(specular, std::move(starts), begun, 0.5);
     monitor_.report("Fitting closures", 0.5);
-    follow(full_, 0.03, 20);
-    keep(2);
+    follow(large_, 0.03, 20);
+    keep(promising);
     for (int round = 0; round < 2 && take_detour(paths); ++round) continue;
     monitor_.report("Fitting closures", 0.8);
     for (FoundCurves& found : found_) {
@@ -140,7 +144,7 @@ class Search {
     if (starts.empty()) {
       for (const ClosureCurves& start : constant) starts.push_back(with_splines(start));
     }
-    std::vector<FoundCurves> promising;
+    std::vector<FoundCurves> from_both;
     std::vector<ViewPaths> paths;
     for (const SearchTarget& small : small_) {
       const double share = static_cast<double>(paths.size()) / static_cast<double>(small_.size());
@@ -152,9 +156,9 @@ class Search {
       for (ClosureCurves& path : paths.back().paths()) found_.push_back({std::move(path), 0});
       follow(medium_, 0.1, 10);
       keep(5);
-      std::move(found_.begin(), found_.end(), std::back_inserter(promising));
+      std::move(found_.begin(), found_.end(), std::back_inserter(from_both));
     }
-    found_ = std::move(promising);
+    found_ = std::move(from_both);
     sort();
     keep(5);
     return paths;
@@ -172,10 +176,10 @@ class Search {
     start_from(detours);
     follow(medium_, 0.1, 10);
     keep(2);
-    follow(full_, 0.03, 20);
+    follow(large_, 0.03, 20);
     const bool better = found_.front().error < best.error;
     found_.insert(better ? found_.begin() + 1 : found_.begin(), best);
-    keep(2);
+    keep(promising);
     return better;
   }
 
@@ -201,7 +205,7 @@ class Search {
 
   void keep(std::size_t most) { found_.resize(std::min(found_.size(), most), found_.front()); }
 
-  const SearchTarget full_, medium_;
+  const SearchTarget full_, large_, medium_;
   const std::vector<SearchTarget> small_;
   const int threads_;
   Monitor& monitor_;

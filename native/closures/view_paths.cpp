@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "measurement/parallel.h"
 
@@ -15,7 +16,8 @@ namespace {
 // when curves follow them.
 constexpr std::array<double, 3> reluctances = {0.05, 0.2, 0.8};
 constexpr double smoothing = 0.03;
-constexpr int iterations = 12;
+// Most starts lead to the same few optima: after the first iterations the better half goes on.
+constexpr int first_iterations = 6, iterations = 8;
 // Optima of a view that are told apart, and what part of the light has to be off for that.
 constexpr int most_optima = 6;
 constexpr double alike = 0.02;
@@ -29,21 +31,15 @@ ViewPaths::ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>
     : threads_(threads) {
   views_.reserve(views.size());
   for (const SearchView& view : views) views_.push_back({view});
-  std::vector<Optima> found(starts.size(), Optima(views_.size()));
-  parallel_for(static_cast<int>(starts.size() * views_.size()), threads, [&](int job) {
-    const std::size_t start = static_cast<std::size_t>(job) / views_.size();
-    const std::size_t view = static_cast<std::size_t>(job) % views_.size();
-    found[start][view] = optimum(view, starts[start], monitor);
-  });
-  for (Optima& of_start : found) {
-    OptimaByView& optima = by_distributions_[of_start.front().closures.distributions];
+  std::map<std::vector<Distribution>, std::vector<ClosureCurves>> groups;
+  for (const ClosureCurves& start : starts) groups[start.distributions].push_back(start);
+  for (const auto& [distributions, group] : groups) {
+    OptimaByView& optima = by_distributions_[distributions];
     optima.resize(views_.size());
-    for (std::size_t view = 0; view < views_.size(); ++view) {
-      optima[view].push_back(std::move(of_start[view]));
-    }
-  }
-  for (auto& [distributions, optima] : by_distributions_) {
-    for (Optima& of_view : optima) of_view = distinct(std::move(of_view));
+    parallel_for(static_cast<int>(views_.size()), threads, [&](int job) {
+      const auto view = static_cast<std::size_t>(job);
+      optima[view] = optima_from(view, group, monitor);
+    });
   }
 }
 
@@ -69,6 +65,22 @@ std::vector<ClosureCurves> ViewPaths::detours(const ClosureCurves& closures,
     optima[view].insert(optima[view].begin(), std::move(own[view]));
   }
   return ways(optima);
+}
+
+ViewPaths::Optima ViewPaths::optima_from(std::size_t view, const std::vector<ClosureCurves>& starts,
+                                         const Monitor& monitor) const {
+  std::vector<std::pair<double, ClosureCurves>> begun;
+  for (const ClosureCurves& start : starts) {
+    ClosureCurves closures = descend(views_[view], start, smoothing, first_iterations, monitor);
+    const double error = smooth_error(views_[view], closures, smoothing);
+    begun.emplace_back(error, std::move(closures));
+  }
+  std::stable_sort(begun.begin(), begun.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  begun.resize((begun.size() + 1) / 2, begun.front());
+  Optima found;
+  for (const auto& [error, closures] : begun) found.push_back(optimum(view, closures, monitor));
+  return distinct(std::move(found));
 }
 
 ViewPaths::Optimum ViewPaths::optimum(std::size_t view, const ClosureCurves& start,

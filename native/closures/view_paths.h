@@ -37,6 +37,8 @@ class ViewPaths {
   using OptimaByView = std::vector<Optima>;
   using Path = std::vector<const Optimum*>;  // one of each view
 
+  Optima optima_from(std::size_t view, const std::vector<ClosureCurves>& starts,
+                     const Monitor& monitor) const;
   Optimum optimum(std::size_t view, const ClosureCurves& start, const Monitor& monitor) const;
   std::vector<ClosureCurves> ways(const OptimaByView& optima) const;
   Path way(const OptimaByView& optima, double reluctance) const;
