@@ -39,7 +39,7 @@ Measurement with_noise(const Measurement& table, double sigma, std::mt19937& ran
   std::vector<double> planes(table.planes().begin(), table.planes().end());
   for (int i = 0; i < Measurement::bin_count; ++i) {
     const int d = i / Measurement::phi_d_bins % Measurement::theta_d_bins;
-    const int h = i / Measurement::row_size;
+    const auto h = static_cast<int>(i / Measurement::row_size);
     const double factor =
         1 + noise(random) + of_patch[static_cast<std::size_t>(h / patch * patches + d / patch)];
     for (int c = 0; c < 3; ++c) {
