@@ -15,6 +15,12 @@ struct CloseFile {
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
+// As std::fopen, with a path of whatever letters the system has.
+File open_file(const std::filesystem::path& path, const std::string& mode);
+
+// A path as sentences show it: in UTF-8, which Python takes sentences for, on every system.
+std::string shown(const std::filesystem::path& path);
+
 // "34992012" -> "34,992,012", as a person reads it.
 std::string with_commas(std::uintmax_t number);
 

@@ -139,16 +139,17 @@ Measurement read_merl(const InputFile& file, int threads) {
 }
 
 void write_merl(const Measurement& measurement, const std::filesystem::path& path) {
-  const std::filesystem::path aside = path.string() + ".part";
+  std::filesystem::path aside = path;
+  aside += ".part";
   const auto give_up = [&](const std::string& why) {
     std::error_code ignored;
     std::filesystem::remove(aside, ignored);
-    throw InputError(path.string() + ": expected to write a MERL table of " +
+    throw InputError(shown(path) + ": expected to write a MERL table of " +
                      with_commas(bytes_of(dimensions)) + " bytes, found: " + why + ".");
   };
   const auto reason = [] { return std::string(std::strerror(errno)); };
   std::vector<double> stored(measurement.planes().begin(), measurement.planes().end());
-  File file(std::fopen(aside.c_str(), "wb"));
+  File file = open_file(aside, "wb");
   if (!file) give_up(reason());
   for (int channel = 0; channel < 3; ++channel) {
     double* const plane = stored.data() + channel * Measurement::bin_count;

@@ -14,31 +14,16 @@ rm -rf "$prefix" "$work"
 mkdir -p "$work"
 
 # A source distribution brings the source of Ceres along. Where it is missing it comes from Debian's
-# source package: the machine's own archive is asked for sources instead of packages, with private
-# apt state, so that no privilege is needed and the machine's package lists stay as they are.
-source="$(cd "$(dirname "$0")" && pwd)/ceres-solver.tar.xz"
+# source package.
+folder=$(cd "$(dirname "$0")" && pwd)
+source="$folder/ceres-solver.tar.xz"
 cd "$work"
-download_source() {
-    mkdir -p lists/partial cache/archives/partial
-    . /etc/os-release
-    keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-    line="deb-src [signed-by=$keyring] \$(REPO_URI) \$(RELEASE) \$(COMPONENT)"
-    apt-get indextargets --format "$line" \
-        'Created-By: Packages' "Release: $VERSION_CODENAME" 'Component: main' | sort -u >sources.list
-    if ! [ -s sources.list ]; then
-        echo "ceres.sh: expected an apt source of Debian $VERSION_CODENAME main, found none" >&2
-        exit 1
-    fi
-    private_apt_get update
+if ! [ -e "$source" ]; then
+    . "$folder/debian.sh"
+    know_debian deb-src
     private_apt_get source --download-only ceres-solver
     mv ceres-solver_*.orig.tar.xz "$source"
-}
-private_apt_get() {
-    apt-get -qq -o Dir::Etc::sourcelist="$PWD/sources.list" -o Dir::Etc::sourceparts=/dev/null \
-        -o Dir::State::lists="$PWD/lists" -o Dir::State::status=/dev/null \
-        -o Dir::Cache="$PWD/cache" -o APT::Sandbox::User=root "$@"
-}
-[ -e "$source" ] || download_source
+fi
 tar -xf "$source"
 
 # Only what a small dense problem needs. CUDA must be named, because Ceres links it where it finds
