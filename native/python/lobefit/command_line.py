@@ -838,7 +838,7 @@ def _records(options: argparse.Namespace, records: list[Record]) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    if place_to_write(options.output).suffix.lower() != ".png":
+    if place_to_write(options.output).suffix.lower() not in ("", ".png"):
         raise InputError(f"{options.output}: expected a name that ends in .png.")
     records: list[Record] = []
     code = _records(options, records)
