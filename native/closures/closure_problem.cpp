@@ -145,7 +145,7 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
     }
     for (int c = 0; c < 3; ++c) {
       for (int l = 0; l < layout.closures(); ++l) {
-        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][3 * k]);
+        const Eigen::Map<const Eigen::RowVector3d> part(&sums.matrix_vx[c][l][shape_of(k)]);
         result.matrix.block<1, 3>(layout.weight(l, c), row) =
             at.curves[layout.weight(k, c)] * part * by_k;
       }

@@ -33,8 +33,9 @@ ViewPaths::ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>
   for (const SearchView& view : views) views_.push_back({view});
   std::map<std::vector<Distribution>, std::vector<ClosureCurves>> groups;
   for (const ClosureCurves& start : starts) groups[start.distributions].push_back(start);
-  for (const auto& [distributions, group] : groups) {
-    OptimaByView& optima = by_distributions_[distributions];
+  for (const auto& each : groups) {
+    const std::vector<ClosureCurves>& group = each.second;
+    OptimaByView& optima = by_distributions_[each.first];
     optima.resize(views_.size());
     parallel_for(static_cast<int>(views_.size()), threads, [&](int job) {
       const auto view = static_cast<std::size_t>(job);
