@@ -206,15 +206,19 @@ TEST(Objective, IsFiniteOnEveryBound) {
   }
 }
 
-TEST(CompressedCost, HasValueGradientAndMatrixOfTheObjective) {
+class CompressedCostTest : public testing::Test {
+ protected:
   const FitOptions options;
   const Samples samples = subsample(all_samples(table(), options), 2000);
-  const Variables variables(options.kind, true, false);
-  const Objective objective(samples, variables, Norm::l1, 0.1, 1);
-  const VectorXd x = inside(variables);
-  const std::vector<int> free = {3, 4, 5, 6, 7};
+  const Variables variables{options.kind, true, false};
+  const Objective objective{samples, variables, Norm::l1, 0.1, 1};
+  const VectorXd x = inside(variables);  // alpha = 0.4
   const Monitor monitor;
   NewtonPause pause;
+};
+
+TEST_F(CompressedCostTest, HasValueGradientAndMatrixOfTheObjective) {
+  const std::vector<int> free = {3, 4, 5, 6, 7};
   const CompressedCost cost(objective, free, x, pause, monitor);
   const VectorXd values = x(free);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> jacobian(6, 5);
@@ -237,14 +241,7 @@ TEST(CompressedCost, HasValueGradientAndMatrixOfTheObjective) {
 }
 
 // Also where the solver would not have taken it.
-TEST(CompressedCost, KnowsTheBestPointThatItWasAskedAbout) {
-  const FitOptions options;
-  const Samples samples = subsample(all_samples(table(), options), 2000);
-  const Variables variables(options.kind, true, false);
-  const Objective objective(samples, variables, Norm::l1, 0.1, 1);
-  const VectorXd x = inside(variables);
-  const Monitor monitor;
-  NewtonPause pause;
+TEST_F(CompressedCostTest, KnowsTheBestPointThatItWasAskedAbout) {
   const CompressedCost cost(objective, {0, 1}, x, pause, monitor);
   const double points[][2] = {{x[0], x[1]}, {2 * x[0], 2 * x[1]}, {0.5 * x[0], 0.5 * x[1]}};
   double least = std::numeric_limits<double>::infinity();
@@ -258,14 +255,7 @@ TEST(CompressedCost, KnowsTheBestPointThatItWasAskedAbout) {
   EXPECT_GT(residuals.squaredNorm(), 1.001 * least);
 }
 
-TEST(CompressedCost, CutsAStepAtTheBoundThatItMeets) {
-  const FitOptions options;
-  const Samples samples = subsample(all_samples(table(), options), 2000);
-  const Variables variables(options.kind, true, false);
-  const Objective objective(samples, variables, Norm::l1, 0.1, 1);
-  const VectorXd x = inside(variables);  // alpha = 0.4
-  const Monitor monitor;
-  NewtonPause pause;
+TEST_F(CompressedCostTest, CutsAStepAtTheBoundThatItMeets) {
   const CompressedCost cost(objective, {3, variables.interpolation()}, x, pause, monitor);
   const double beyond[] = {x[3] + 2, 1.6};
   EXPECT_TRUE(cost.left_bounds(beyond));

@@ -6,7 +6,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -193,6 +193,20 @@ def test_the_bar_tells_how_far_all_files_are(tmp_path):
     assert (0.125, "0.binary: polish") in drawn and (0.25, "1.binary: polish") in drawn
     shares = [share for share, _ in drawn]
     assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_a_folder_that_is_taken_away_meanwhile_is_made_again(tmp_path, record):
+    place = tmp_path / "records" / "gold.json"
+    place.parent.mkdir()
+
+    def taken_away(tasks, watch):
+        place.parent.rmdir()
+        yield tasks[0], record
+
+    tasks = [Task(tmp_path / "gold.binary", place, [], {})]
+    batch_of_one = Batch(tasks, taken_away, keep=False, bar=lambda title: nullcontext())
+    assert [outcome for _, outcome in batch_of_one.run()] == [record]
+    assert place.is_file()
 
 
 @pytest.fixture(scope="module")

@@ -116,6 +116,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 def remove_empty(folder: str | os.PathLike[str]) -> None:
     """Removes the folders below `folder` that hold nothing, and itself if nothing is left in it."""
     for place, _, _ in os.walk(folder, topdown=False):
+        # The system refuses it for those that hold something, and they stay.
         with contextlib.suppress(OSError):
             os.rmdir(place)
 

@@ -24,7 +24,7 @@ from typing import Any
 
 from lobefit import blender
 from lobefit._native import InputError, build_id
-from lobefit.atomic import place_to_write
+from lobefit.atomic import make_folder, place_to_write
 from lobefit.fitting import Closures
 from lobefit.inputs import RECORD_SUFFIX, Progress, kept_record, record_of
 from lobefit.origin import is_unchanged
@@ -177,6 +177,8 @@ class Batch:
 def _saved(task: Task, outcome: Outcome) -> Outcome:
     if isinstance(outcome, Record):
         try:
+            # A library of another process that was refused may have taken the empty folder with it.
+            make_folder(task.place.parent)
             outcome.save(task.place)
         except InputError as error:
             return error
