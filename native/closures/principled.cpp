@@ -1,75 +1,57 @@
 #include "closures/principled.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 
-#include "closures/principled_terms.h"
+#include "closures/coat_table.h"
+#include "closures/principled_terms.inc"
 
 namespace lobefit {
-namespace {
 
-// Visits wi.wh over the visible normals of a GGX surface seen under n.wo that reflect upward, by
-// stretched spherical caps (Dupuy and Benyoub 2023) at the points of a Fibonacci lattice of equal
-// weights; returns the number of all its points.
-template <typename Visitor>
-int visit_visible_normals(double roughness, double n_wo, Visitor&& visit) {
-  constexpr int points = 987, stride = 610;
-  const double alpha = roughness * roughness;
-  const Vector3 wo(std::sqrt(1 - n_wo * n_wo), 0, n_wo);
-  const Vector3 stretched = Vector3(alpha * wo.x(), 0, wo.z()).normalized();
-  for (int point = 0; point < points; ++point) {
-    // The normals are symmetric about the plane of wo, so half a turn is enough.
-    const double phi = pi * (point * stride % points + 0.5) / points;
-    const double z = 1 - (point + 0.5) / points * (1 + stretched.z());
-    const double radius = std::sqrt(std::max(0.0, 1 - z * z));
-    const Vector3 sum = Vector3(radius * std::cos(phi), radius * std::sin(phi), z) + stretched;
-    const Vector3 wh = Vector3(alpha * sum.x(), alpha * sum.y(), sum.z()).normalized();
-    const double wo_h = wo.dot(wh);
-    if (2 * wo_h * wh.z() > wo.z()) visit(wo_h);
+PrincipledTerms principled_terms(const SharedSockets& sockets, double n_wo) {
+  using S = PrincipledSlopes;
+  const auto& [metallic, roughness, root, tint] = sockets;
+  const double alpha2 = std::pow(roughness, 4);
+  PrincipledTerms t{};
+  t.metallic = metallic;
+  t.alpha2 = alpha2;
+  // Cycles takes anything narrower for a mirror.
+  t.scale = alpha2 > 2e-10 ? 1 / (2 * pi * n_wo) : 0;
+  const double spread = alpha2 * (1 - n_wo * n_wo) / (n_wo * n_wo);
+  t.masking_o = std::sqrt(1 + spread);
+  t.masking_o_by_log_roughness = 2 * spread / t.masking_o;
+  t.dielectric = dielectric_terms(root);
+  // At ior = 1 there is no coat, and the root of the root has no derivative.
+  const double root_ior = std::sqrt(root);
+  const CoatTable::Share coat =
+      root > 0 ? CoatTable::instance()(roughness, n_wo, root_ior) : CoatTable::Share{};
+  const double untinted = 1 - root * root * tint, uncoated = std::clamp(1 - coat.value, 0.0, 1.0);
+  const double share = (1 - metallic) / pi;
+  t.diffuse = share * untinted * uncoated;
+  t.diffuse_by[S::metallic] = -untinted * uncoated / pi;
+  t.diffuse_by[S::log_roughness] = -share * untinted * coat.by_roughness * roughness;
+  t.diffuse_by[S::reflectance_root] = -share * 2 * root * tint * uncoated;
+  if (root > 0) {
+    t.diffuse_by[S::reflectance_root] -= share * untinted * coat.by_root_ior / (2 * root_ior);
   }
-  return points;
-}
-
-}  // namespace
-
-CoatTable::CoatTable() {
-  std::array<double, nodes> positions, roots;
-  for (std::size_t i = 0; i < nodes; ++i) {
-    positions[i] = std::max(double(i) / (nodes - 1), 1e-4);
-    roots[i] = square(std::min(positions[i], 0.99));
-  }
-  auto* value = values_.data();
-  for (const double roughness : positions) {
-    for (const double n_wo : positions) {
-      std::array<double, nodes> sums{};
-      const int points = visit_visible_normals(roughness, n_wo, [&](double cosine) {
-        for (std::size_t i = 0; i < nodes; ++i) sums[i] += schlick_weight(roots[i], cosine);
-      });
-      for (const double sum : sums) *value++ = static_cast<float>(sum / points);
-    }
-  }
-}
-
-const CoatTable& CoatTable::instance() {
-  static const CoatTable table;
-  return table;
-}
-
-FacetGeometry facet_geometry(const Vector3& wi, const Vector3& wo) {
-  const Vector3 wh = (wi + wo).normalized();
-  return {wi.z(), wo.z(), std::clamp(wi.dot(wh), 0.0, 1.0), square(wh.x()) + square(wh.y()),
-          square(wh.z())};
+  t.diffuse_by[S::brightest_tint] = -share * root * root * uncoated;
+  return t;
 }
 
 Rgb evaluate_principled(const Principled& principled, const Vector3& wi, const Vector3& wo) {
   if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
-  const SharedSockets<double> shared = {principled.metallic, principled.roughness,
-                                        (principled.ior - 1) / (principled.ior + 1),
-                                        principled.specular_tint.maxCoeff()};
-  const auto light =
-      principled_at_light(shared, principled_at_view(shared, wo.z()), facet_geometry(wi, wo));
+  const PrincipledTerms terms = principled_terms(
+      {principled.metallic, principled.roughness, (principled.ior - 1) / (principled.ior + 1),
+       principled.specular_tint.maxCoeff()},
+      wo.z());
+  const FacetLight<double> at = facet_light(wi, Vector3((wi + wo).normalized()));
+  const PrincipledLight<double> light = principled_light<false>(terms, at);
   Rgb result;
   for (int c = 0; c < 3; ++c) {
-    result[c] = principled_channel(light, principled.base_color[c], principled.specular_tint[c]);
+    result[c] = principled_channel<false>(terms, at, light, principled.base_color[c],
+                                          principled.specular_tint[c])
+                    .value;
   }
   return result;
 }

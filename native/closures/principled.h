@@ -33,7 +33,7 @@ Rgb evaluate_principled(const Principled& principled, const Vector3& wi, const V
 
 // The Principled BSDF that is nearest to the target by error_of, the best of 32 starts. Always
 // gives legal, finite sockets; a target without samples gives a black one without a coat, with the
-// error 0. roughness is at least 0.03, ior at most 99. Takes some 0.16 s on one thread. threads: 0
+// error 0. roughness is at least 0.03, ior at most 99. Takes some 0.03 s on one thread. threads: 0
 // for every processor; the result is the same for any number.
 Principled fit_principled(const Target& target, int threads = 0);
 

@@ -1,11 +1,12 @@
-#include <ceres/jet.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <vector>
 
 #include "closures/principled.h"
-#include "closures/principled_terms.h"
+#include "closures/principled_kernel.h"
+#include "closures/principled_terms.inc"
 #include "measurement/parallel.h"
 
 namespace lobefit {
@@ -40,15 +41,8 @@ const Vector& greatest() {
   return bound;
 }
 
-// One channel depends on the four shared sockets and two of its own, in this order.
-constexpr int shared_unknowns = 4, own_unknowns = shared_unknowns + 2;
-using SharedDual = ceres::Jet<double, shared_unknowns>;
-using ColourDual = ceres::Jet<double, 2>;
-// What depends on one socket alone is differentiated by it alone.
-using OwnDual = ceres::Jet<double, 1>;
-
-// The unknown that each of them is.
-using OwnUnknowns = std::array<int, own_unknowns>;
+// The unknown that each of the slopes of a channel is by.
+using OwnUnknowns = std::array<int, PrincipledSlopes::count>;
 OwnUnknowns own_unknowns_of(int channel, int brightest_tint) {
   return {metallic, log_roughness, root, tint + brightest_tint, base + channel, tint + channel};
 }
@@ -59,40 +53,73 @@ int brightest_tint(const Vector& x) {
   return brightest;
 }
 
-// A light of the target, and the lights of a view.
-struct Sample {
-  FacetGeometry at;
-  Rgb target;
-  double weight;
-  double typical;
-};
-struct View {
-  double n_wo;
-  std::vector<Sample> samples;
+// A view's lights, each amount in a column of its own, padded with black ones that weigh nothing.
+class View {
+ public:
+  // Of the lights one of `every_light`.
+  View(const TargetView& view, std::size_t every_light) : n_wo_(view.wo.z()) {
+    const std::size_t count = (view.lights.size() + every_light - 1) / every_light;
+    constexpr std::size_t lanes = principled_kernel_lanes;
+    columns_.resize(static_cast<Eigen::Index>((count + lanes - 1) / lanes * lanes), column_count);
+    columns_.rowwise() = Row{1, 1, 0, 1, 0, 0, 0, 0, 1};
+    for (std::size_t i = 0; i < count; ++i) {
+      const TargetLight& light = view.lights[i * every_light];
+      const FacetLight<double> at = facet_light(light.wi, light.half);
+      columns_.row(static_cast<Eigen::Index>(i)) = Row{at.n_wi,
+                                                       at.wi_h,
+                                                       at.sin2_h,
+                                                       at.cos2_h,
+                                                       light.reflected[0],
+                                                       light.reflected[1],
+                                                       light.reflected[2],
+                                                       light.weight,
+                                                       light.typical};
+    }
+  }
+
+  double n_wo() const { return n_wo_; }
+  PrincipledKernelLights lights() const {
+    const auto column = [&](int i) { return columns_.col(i).data(); };
+    return {static_cast<std::size_t>(columns_.rows()),
+            {column(0), column(1), column(2), column(3)},
+            {column(4), column(5), column(6)},
+            column(7),
+            column(8)};
+  }
+
+ private:
+  static constexpr int column_count = 9;
+  using Row = Eigen::Array<double, 1, column_count>;
+  double n_wo_;
+  Eigen::Array<double, Eigen::Dynamic, column_count> columns_;
 };
 
 // Views, and how many threads share a sum over them.
 struct Views {
-  std::vector<View> all;
+  std::vector<const View*> all;
   int threads = 1;
 };
 
+// The middle one of the first `every` of a number of things, and every so many-th from there on.
+std::vector<std::size_t> one_of(std::size_t every, std::size_t count) {
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = std::min(every, count) / 2; i < count; i += every) chosen.push_back(i);
+  return chosen;
+}
+
 // One of `every_view` views, and of its lights one of `every_light`.
-Views thin_out(const Target& target, std::size_t every_view, std::size_t every_light,
-               int threads = 1) {
-  Views views{{}, threads};
-  const std::size_t first_view = std::min(every_view, target.size()) / 2;
-  for (std::size_t v = first_view; v < target.size(); v += every_view) {
-    const TargetView& from = target[v];
-    View view{from.wo.z(), {}};
-    for (std::size_t i = 0; i < from.lights.size(); i += every_light) {
-      const TargetLight& light = from.lights[i];
-      view.samples.push_back(
-          {facet_geometry(light.wi, from.wo), light.reflected, light.weight, light.typical});
-    }
-    views.all.push_back(std::move(view));
+std::vector<View> views_of(const Target& target, std::size_t every_view, std::size_t every_light) {
+  std::vector<View> views;
+  for (const std::size_t v : one_of(every_view, target.size())) {
+    views.emplace_back(target[v], every_light);
   }
   return views;
+}
+
+Views thin_out(const std::vector<View>& views, std::size_t every, int threads = 1) {
+  Views some{{}, threads};
+  for (const std::size_t v : one_of(every, views.size())) some.all.push_back(&views[v]);
+  return some;
 }
 
 // The sum of what each view adds, in the order of the views whatever the number of threads.
@@ -101,135 +128,58 @@ Sum sum_over_views(const Views& views, Sum sum, OfView&& of_view) {
   std::vector<Sum> parts(views.all.size(), sum);
   parallel_for(static_cast<int>(parts.size()), views.threads, [&](int v) {
     const auto at = static_cast<std::size_t>(v);
-    parts[at] = of_view(views.all[at]);
+    parts[at] = of_view(*views.all[at]);
   });
   for (const Sum& part : parts) sum += part;
   return sum;
 }
 
-// The sum of an amount over all samples, given what the sockets reflect there.
-template <typename Sum, typename Amount>
-Sum sum_over(const Views& views, const Vector& x, const Sum& zero, Amount&& amount) {
-  const SharedSockets<double> shared = {x[metallic], std::exp(x[log_roughness]), x[root],
-                                        x.segment<3>(tint).maxCoeff()};
-  return sum_over_views(views, zero, [&](const View& view) {
-    Sum sum = zero;
-    const auto at_view = principled_at_view(shared, view.n_wo);
-    for (const Sample& sample : view.samples) {
-      const auto light = principled_at_light(shared, at_view, sample.at);
-      Rgb reflected;
-      for (int c = 0; c < 3; ++c) {
-        reflected[c] = principled_channel(light, x[base + c], x[tint + c]);
-      }
-      sum += amount(sample, reflected);
-    }
-    return sum;
-  });
+PrincipledKernelInput kernel_input(const View& view, const Vector& x, double smoothing) {
+  const SharedSockets shared = {x[metallic], std::exp(x[log_roughness]), x[root],
+                                x.segment<3>(tint).maxCoeff()};
+  PrincipledKernelInput in{view.lights(), principled_terms(shared, view.n_wo()), {}, {}, smoothing};
+  std::copy_n(x.data() + base, 3, in.base_color);
+  std::copy_n(x.data() + tint, 3, in.specular_tint);
+  return in;
 }
 
-// The distance to the target by error_of, up to a factor where views or lights are left out.
-double error_of(const Views& views, const Vector& x) {
-  return sum_over(views, x, 0.0, [](const Sample& sample, const Rgb& reflected) {
-    return sample.weight * (reflected - sample.target).abs().sum();
-  });
-}
-
-// The same with |r| made smooth as sqrt(r^2 + e^2) - e, e = smoothing x typical.
+// The distance to the target by error_of, up to a factor where views or lights are left out, with
+// |r| made smooth as sqrt(r^2 + e^2) - e, e = smoothing x typical.
 double smooth_error(const Views& views, const Vector& x, double smoothing) {
-  return sum_over(views, x, 0.0, [smoothing](const Sample& sample, const Rgb& reflected) {
-    const double e = smoothing * sample.typical;
-    const Rgb r2 = (reflected - sample.target).square();
-    // r^2 / (sqrt(r^2 + e^2) + e) keeps its digits where r is small.
-    return sample.weight * (r2 / ((r2 + e * e).sqrt() + e)).sum();
+  return sum_over_views(views, 0.0, [&](const View& view) {
+    return run_principled_error(kernel_input(view, x, smoothing));
   });
 }
 
-// Of each channel, by its own unknowns: the gradient of smooth_error and the matrix of its
-// iteratively reweighted least squares.
-struct ChannelEquations {
-  std::array<Eigen::Matrix<double, own_unknowns, own_unknowns>, 3> matrices;
-  std::array<Eigen::Matrix<double, own_unknowns, 1>, 3> gradients;
+// The gradient of smooth_error and the matrix of its iteratively reweighted least squares, by all
+// unknowns.
+struct NormalEquations {
+  Matrix matrix = Matrix::Zero();
+  Vector gradient = Vector::Zero();
 
-  ChannelEquations() {
-    for (auto& matrix : matrices) matrix.setZero();
-    for (auto& gradient : gradients) gradient.setZero();
-  }
-  ChannelEquations& operator+=(const ChannelEquations& other) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      matrices[c] += other.matrices[c];
-      gradients[c] += other.gradients[c];
-    }
+  NormalEquations& operator+=(const NormalEquations& other) {
+    matrix += other.matrix;
+    gradient += other.gradient;
     return *this;
   }
 };
 
-// The same by all unknowns.
-struct NormalEquations {
-  Matrix matrix = Matrix::Zero();
-  Vector gradient = Vector::Zero();
-};
-
-// principled_channel, and its derivatives: those by shared sockets come from what the channels
-// share, those by the two colours from the metal's Fresnel term alone.
-double differentiate_channel(const PrincipledAtLight<SharedDual>& light, double base_color,
-                             double specular_tint,
-                             Eigen::Matrix<double, own_unknowns, 1>& derivatives) {
-  const ColourDual fresnel =
-      metal_fresnel(ColourDual(base_color, 0), ColourDual(specular_tint, 1), light.wi_h);
-  const SharedDual value = principled_sum(light, fresnel.a, base_color, specular_tint);
-  derivatives << value.v, light.metal.a * fresnel.v[0] + light.diffuse.a,
-      light.metal.a * fresnel.v[1] + light.dielectric.a;
-  return value.a;
-}
-
-SharedDual as_shared(const OwnDual& value, int unknown) {
-  SharedDual shared(value.a);
-  shared.v[unknown] = value.v[0];
-  return shared;
-}
-
 NormalEquations linearise(const Views& views, const Vector& x, double smoothing) {
-  using std::exp;
   const int brightest = brightest_tint(x);
-  const OwnDual roughness = exp(OwnDual(x[log_roughness], 0)), own_root(x[root], 0);
-  const SharedSockets<SharedDual> shared = {SharedDual(x[metallic], 0), as_shared(roughness, 1),
-                                            SharedDual(x[root], 2),
-                                            SharedDual(x[tint + brightest], 3)};
-  const auto of_view = [&](const View& view) {
-    ChannelEquations sums;
-    Eigen::Matrix<double, own_unknowns, 1> slope;
-    const auto at_view = principled_at_view(shared, view.n_wo);
-    const OwnDual masking = ggx_masking(roughness, view.n_wo);
-    for (const Sample& sample : view.samples) {
-      const auto light = principled_at_light(shared, at_view, sample.at,
-                                             as_shared(schlick_weight(own_root, sample.at.wi_h), 2),
-                                             as_shared(ggx_lobe(roughness, masking, sample.at), 1));
-      const double e = smoothing * sample.typical;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const auto channel = static_cast<Eigen::Index>(c);
-        const double value =
-            differentiate_channel(light, x[base + channel], x[tint + channel], slope);
-        const double r = value - sample.target[channel];
-        const double weight = sample.weight / std::sqrt(r * r + e * e);
-        sums.matrices[c].noalias() += (weight * slope) * slope.transpose();
-        sums.gradients[c] += (weight * r) * slope;
+  return sum_over_views(views, NormalEquations(), [&](const View& view) {
+    const PrincipledKernelSums sums = run_principled_kernel(kernel_input(view, x, smoothing));
+    NormalEquations equations;
+    for (int c = 0; c < 3; ++c) {
+      const OwnUnknowns own = own_unknowns_of(c, brightest);
+      for (std::size_t j = 0; j < own.size(); ++j) {
+        equations.gradient[own[j]] += sums.gradient[c][j];
+        for (std::size_t i = 0; i < own.size(); ++i) {
+          equations.matrix(own[i], own[j]) += sums.matrix[c][std::max(i, j)][std::min(i, j)];
+        }
       }
     }
-    return sums;
-  };
-  const ChannelEquations sums = sum_over_views(views, ChannelEquations(), of_view);
-  NormalEquations equations;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const OwnUnknowns own = own_unknowns_of(static_cast<int>(c), brightest);
-    for (int j = 0; j < own_unknowns; ++j) {
-      const int column = own[static_cast<std::size_t>(j)];
-      equations.gradient[column] += sums.gradients[c][j];
-      for (int i = 0; i < own_unknowns; ++i) {
-        equations.matrix(own[static_cast<std::size_t>(i)], column) += sums.matrices[c](i, j);
-      }
-    }
-  }
-  return equations;
+    return equations;
+  });
 }
 
 // A damped step, within the bounds. An unknown at its bound stays there while the error falls
@@ -273,21 +223,49 @@ Vector descend(const Views& views, Vector x, double smoothing, int iterations) {
   return x;
 }
 
+// Calls visit(lights, i) for every light of the views.
+template <typename Visitor>
+void visit_lights(const Views& views, Visitor&& visit) {
+  for (const View* view : views.all) {
+    const PrincipledKernelLights lights = view->lights();
+    for (std::size_t i = 0; i < lights.count; ++i) {
+      const bool padding = !(lights.weight[i] > 0);
+      if (!padding) visit(*view, lights, i);
+    }
+  }
+}
+
 // The median colour of the target away from its highlight, as the albedo of a diffuse surface.
 Rgb diffuse_albedo(const Views& views) {
-  Rgb albedo;
-  for (int c = 0; c < 3; ++c) {
-    std::vector<double> values;
-    for (const View& view : views.all) {
-      for (const Sample& sample : view.samples) {
-        if (sample.at.cos2_h < 0.6) values.push_back(pi * sample.target[c] / sample.at.n_wi);
-      }
+  std::array<std::vector<double>, 3> values;
+  visit_lights(views, [&](const View&, const PrincipledKernelLights& lights, std::size_t i) {
+    if (!(lights.at.cos2_h[i] < 0.6)) return;
+    for (std::size_t c = 0; c < 3; ++c) {
+      values[c].push_back(pi * lights.reflected[c][i] / lights.at.n_wi[i]);
     }
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    albedo[c] = values.empty() ? 0.5 : std::clamp(*middle, 0.0, 1.0);
+  });
+  Rgb albedo = Rgb::Constant(0.5);
+  for (std::size_t c = 0; c < 3 && !values[c].empty(); ++c) {
+    const auto middle = values[c].begin() + static_cast<std::ptrdiff_t>(values[c].size() / 2);
+    std::nth_element(values[c].begin(), middle, values[c].end());
+    albedo[static_cast<Eigen::Index>(c)] = std::clamp(*middle, 0.0, 1.0);
   }
   return albedo;
+}
+
+// The colours of the metal of this roughness that returns the target's light.
+Rgb metal_colour(const Views& views, double roughness) {
+  Rgb wanted = Rgb::Zero();
+  double given = 0;
+  visit_lights(views, [&](const View& view, const PrincipledKernelLights& lights, std::size_t i) {
+    const PrincipledTerms terms = principled_terms({1, roughness, 0, 1}, view.n_wo());
+    const FacetLight<double> at = {lights.at.n_wi[i], lights.at.wi_h[i], lights.at.sin2_h[i],
+                                   lights.at.cos2_h[i]};
+    given += lights.weight[i] * ggx_lobe<false>(terms, at).value;
+    wanted += lights.weight[i] *
+              Rgb(lights.reflected[0][i], lights.reflected[1][i], lights.reflected[2][i]);
+  });
+  return (wanted / given).cwiseMin(1);
 }
 
 // Where the search begins, 32 points: from sharp to rough a dielectric over a diffuse surface, a
@@ -304,15 +282,7 @@ std::vector<Vector> starts(const Views& views) {
           reflectance_root;
       return x;
     };
-    const Vector white = start(Rgb::Ones(), Rgb::Ones(), 1, 0.2);
-    using Both = Eigen::Array<double, 3, 2>;  // wanted, given
-    const Both light = sum_over(views, white, Both(Both::Zero()),
-                                [](const Sample& sample, const Rgb& reflected) -> Both {
-                                  Both both;
-                                  both << sample.weight * sample.target, sample.weight * reflected;
-                                  return both;
-                                });
-    const Rgb metal = (light.col(0) / light.col(1)).cwiseMin(1);
+    const Rgb metal = metal_colour(views, roughness);
     all.push_back(start(albedo, Rgb::Ones(), 0, 0.2));
     all.push_back(start(metal, Rgb::Constant(0.8), 1, 0.2));
     all.push_back(start((metal + albedo) / 2, Rgb::Constant(0.8), 0.5, 0.2));
@@ -330,8 +300,9 @@ struct Candidate {
 
 Principled fit_principled(const Target& target, int threads) {
   if (target.empty()) return {};
-  const Views few = thin_out(target, 12, 3), some = thin_out(target, 12, 1),
-              all = thin_out(target, 2, 1, thread_count(threads));
+  const std::vector<View> thin = views_of(target, 12, 3), whole = views_of(target, 1, 1);
+  const Views few = thin_out(thin, 1), some = thin_out(whole, 12),
+              half = thin_out(whole, 2, thread_count(threads));
   std::vector<Candidate> found;
   for (const Vector& start : starts(few)) found.push_back({start, 0});
   // Follows every candidate and keeps the best few.
@@ -339,7 +310,7 @@ Principled fit_principled(const Target& target, int threads) {
     parallel_for(static_cast<int>(found.size()), thread_count(threads), [&](int i) {
       Candidate& candidate = found[static_cast<std::size_t>(i)];
       candidate.x = descend(views, candidate.x, smoothing, iterations);
-      candidate.error = error_of(views, candidate.x);
+      candidate.error = smooth_error(views, candidate.x, 0);
     });
     std::stable_sort(found.begin(), found.end(),
                      [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
@@ -349,7 +320,7 @@ Principled fit_principled(const Target& target, int threads) {
   follow(few, 0.03, 8, 4);
   follow(some, 0.03, 8, 2);
   follow(some, 0.01, 10, 1);
-  follow(all, 0.003, 10, 1);
+  follow(half, 0.003, 10, 1);
   const Vector& best = found.front().x;
   Principled result;
   result.base_color = best.segment<3>(base).array();
@@ -357,9 +328,10 @@ Principled fit_principled(const Target& target, int threads) {
   result.metallic = best[metallic];
   result.roughness = std::exp(best[log_roughness]);
   result.ior = (1 + best[root]) / (1 - best[root]);
-  result.error = error_of(target, [&](const Vector3& wi, const Vector3& wo) {
-    return evaluate_principled(result, wi, wo);
-  });
+  result.error = error_of(
+      target,
+      [&](const Vector3& wi, const Vector3& wo) { return evaluate_principled(result, wi, wo); },
+      threads);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "closures/view_curve.h"
 #include "measurement/parallel.h"
@@ -54,6 +55,20 @@ double picture_share(double cosine) {
   return 4 * cosine * std::sqrt(cosine) * (1 - least_root) / views;
 }
 
+// Of each sector the cosine and sine of its middle. A quarter of a step off, no azimuth is the
+// mirror image of another.
+const std::array<std::array<double, 2>, sectors>& azimuths() {
+  static const auto table = [] {
+    std::array<std::array<double, 2>, sectors> azimuths;
+    for (std::size_t sector = 0; sector < sectors; ++sector) {
+      const double phi = (static_cast<double>(sector) + 0.25) * (2 * pi / sectors);
+      azimuths[sector] = {std::cos(phi), std::sin(phi)};
+    }
+    return azimuths;
+  }();
+  return table;
+}
+
 // Half vectors on rings that crowd toward the normal as the square of their number, where the
 // highlight is; the offset keeps the rings of neighbouring views from repeating each other.
 TargetView sample_view(const Reflectance& f, const Vector3& wo, double share, double offset) {
@@ -62,10 +77,8 @@ TargetView sample_view(const Reflectance& f, const Vector3& wo, double share, do
     const double t = (ring + offset) / rings;
     const double theta_h = t * t * (pi / 2), width = t * pi / rings;
     const double sin_h = std::sin(theta_h), cos_h = std::cos(theta_h);
-    for (int sector = 0; sector < sectors; ++sector) {
-      // A quarter of a step off, no azimuth is the mirror image of another.
-      const double phi = (sector + 0.25) * (2 * pi / sectors);
-      const Vector3 half(sin_h * std::cos(phi), sin_h * std::sin(phi), cos_h);
+    for (const auto& [cos_phi, sin_phi] : azimuths()) {
+      const Vector3 half(sin_h * cos_phi, sin_h * sin_phi, cos_h);
       const double incidence = wo.dot(half);
       const Vector3 wi = 2 * incidence * half - wo;
       if (!(incidence > 0 && wi.z() > 0)) continue;
@@ -150,14 +163,16 @@ Target thinned(const Target& target, std::size_t view_stride, std::size_t light_
   return result;
 }
 
-double error_of(const Target& target, const Reflectance& f_times_cosine) {
-  double error = 0;
-  for (const TargetView& view : target) {
+double error_of(const Target& target, const Reflectance& f_times_cosine, int threads) {
+  std::vector<double> errors(target.size());
+  parallel_for(static_cast<int>(target.size()), thread_count(threads), [&](int i) {
+    const TargetView& view = target[static_cast<std::size_t>(i)];
+    double& error = errors[static_cast<std::size_t>(i)];
     for (const TargetLight& at : view.lights) {
       error += at.weight * (f_times_cosine(at.wi, view.wo) - at.reflected).abs().sum();
     }
-  }
-  return error;
+  });
+  return std::accumulate(errors.begin(), errors.end(), 0.0);
 }
 
 }  // namespace lobefit

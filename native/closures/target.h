@@ -43,7 +43,8 @@ Target sample_target(const Reflectance& f, int threads = 1);
 Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride,
                std::size_t choice = 0);
 
-// sum weight |approximation - reflected|, for f cos of an approximation in the same frame.
-double error_of(const Target& target, const Reflectance& f_times_cosine);
+// sum weight |approximation - reflected|, for f cos of an approximation in the same frame, which
+// `threads` threads (0 for every processor) ask at once.
+double error_of(const Target& target, const Reflectance& f_times_cosine, int threads = 1);
 
 }  // namespace lobefit

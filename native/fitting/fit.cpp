@@ -146,7 +146,7 @@ class Fitter {
     std::vector<Minimum> minima = polish(few_, starts_of(candidates), coarse_precision(), stage);
     judge_certainty(minima);
     monitor_.report("Trying the best of them", 0.5);
-    const Minimum best = best_finalist(best_of_each_shape(minima), stage);
+    Minimum best = best_finalist(best_of_each_shape(minima), stage);
     fit_.converged = best.converged;
     stage.seconds = watch.seconds();
     fit_.stages.push_back(stage);
@@ -157,7 +157,7 @@ class Fitter {
   // for a lobe narrower than a bin a row of them along alpha: those next to the best are then tried
   // too.
   Minimum best_finalist(const std::vector<Minimum>& starts, Stage& stage) const {
-    const Minimum best = polish(some_, starts_of(starts), finishing_precision(), stage).front();
+    Minimum best = polish(some_, starts_of(starts), finishing_precision(), stage).front();
     if (fit_.certainty.agree == fit_.certainty.starts) return best;
     const std::vector<VectorXd> beside = beside_in_alpha(best.x);
     if (beside.empty()) return best;

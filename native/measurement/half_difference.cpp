@@ -7,7 +7,7 @@ namespace lobefit {
 
 HalfDifference to_half_difference(const Vector3& wi, const Vector3& wo) {
   const Vector3 half = (wi + wo).normalized();
-  const double sin_h = std::hypot(half.x(), half.y());
+  const double sin_h = half.head<2>().norm();
   // At theta_h = 0 the azimuth of the half vector is free; x is taken.
   const double cos_phi_h = sin_h > 0 ? half.x() / sin_h : 1.0;
   const double sin_phi_h = sin_h > 0 ? half.y() / sin_h : 0.0;

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "../native/perturb_principled.h"
+#include "closures/coat_table.h"
 #include "closures/principled.h"
-#include "closures/principled_terms.h"
 #include "measurement/input_error.h"
 #include "measurement/read_measurement.h"
 

@@ -208,12 +208,12 @@ TEST(Objective, IsFiniteOnEveryBound) {
 
 class CompressedCostTest : public testing::Test {
  protected:
-  const FitOptions options;
+  const FitOptions options{};
   const Samples samples = subsample(all_samples(table(), options), 2000);
   const Variables variables{options.kind, true, false};
   const Objective objective{samples, variables, Norm::l1, 0.1, 1};
   const VectorXd x = inside(variables);  // alpha = 0.4
-  const Monitor monitor;
+  const Monitor monitor{};
   NewtonPause pause;
 };
 

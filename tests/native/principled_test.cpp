@@ -1,13 +1,16 @@
 #include "closures/principled.h"
 
-#include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
-#include "closures/principled_terms.h"
+#include "closures/principled_kernel.h"
+#include "closures/principled_terms.inc"
+#include "measurement/instructions.h"
 #include "perturb_principled.h"
 #include "reflectance/abc.h"
 
@@ -110,33 +113,137 @@ TEST(Principled, ReflectsNoMoreThanItReceives) {
   }
 }
 
+using ByUnknown = std::array<double, PrincipledSlopes::count>;
+
+// A channel by what it is differentiated by.
+template <bool derivatives>
+PrincipledChannel<double> channel_at(const ByUnknown& x, const FacetLight<double>& at,
+                                     double n_wo) {
+  using S = PrincipledSlopes;
+  const PrincipledTerms terms = principled_terms(
+      {x[S::metallic], std::exp(x[S::log_roughness]), x[S::reflectance_root], x[S::brightest_tint]},
+      n_wo);
+  return principled_channel<derivatives>(terms, at, principled_light<derivatives>(terms, at),
+                                         x[S::base_color], x[S::specular_tint]);
+}
+
 TEST(Principled, DerivativesAreThoseOfTheValues) {
-  using Dual = ceres::Jet<double, 9>;
-  const std::array<double, 9> point = {0.7, 0.4, 0.2, 0.5, 0.9, 0.3, 0.35, 0.43, 0.31};
-  const FacetGeometry at = facet_geometry(direction(55, 10), direction(40, 170));
-  // Tint of the green channel is the brightest.
-  const auto terms = [&](const auto& x) {
-    using T = std::decay_t<decltype(x[0])>;
-    const SharedSockets<T> shared = {x[6], x[7], x[8], x[4]};
-    const auto light = principled_at_light(shared, principled_at_view(shared, at.n_wo), at);
-    return std::array<T, 3>{principled_channel(light, x[0], x[3]),
-                            principled_channel(light, x[1], x[4]),
-                            principled_channel(light, x[2], x[5])};
-  };
-  std::array<Dual, 9> dual;
-  for (std::size_t i = 0; i < 9; ++i) dual[i] = Dual(point[i], static_cast<int>(i));
-  const auto values = terms(dual);
-  for (std::size_t i = 0; i < 9; ++i) {
-    auto above = point, below = point;
-    above[i] += 1e-5;
-    below[i] -= 1e-5;
-    const auto high = terms(above);
-    const auto low = terms(below);
-    for (std::size_t c = 0; c < 3; ++c) {
-      EXPECT_NEAR(values[c].v[static_cast<int>(i)], (high[c] - low[c]) / 2e-5, 1e-7)
-          << "derivative of channel " << c << " by socket " << i;
+  const Vector3 wo = direction(40, 170);
+  for (const Vector3& wi : {direction(55, 10), direction(38, -20), direction(80, 60)}) {
+    const FacetLight<double> at = facet_light(wi, Vector3((wi + wo).normalized()));
+    for (const ByUnknown& point : {ByUnknown{0.35, std::log(0.43), 0.31, 0.9, 0.7, 0.5},
+                                   ByUnknown{0.9, std::log(0.2), 0.75, 0.6, 0.1, 0.2},
+                                   ByUnknown{0.1, std::log(0.8), 0.02}}) {
+      const PrincipledChannel<double> channel = channel_at<true>(point, at, wo.z());
+      EXPECT_EQ(channel.value, channel_at<false>(point, at, wo.z()).value);
+      for (std::size_t i = 0; i < point.size(); ++i) {
+        constexpr double step = 1e-5;
+        auto above = point, below = point;
+        above[i] += step;
+        below[i] -= step;
+        const double slope = (channel_at<false>(above, at, wo.z()).value -
+                              channel_at<false>(below, at, wo.z()).value) /
+                             (2 * step);
+        // What a step of 1e-5 leaves out is the third derivative's, at most some hundreds here.
+        EXPECT_NEAR(channel.slopes[i], slope, 1e-7) << "derivative by unknown " << i;
+      }
     }
   }
+}
+
+// Lights of a view in columns, with a weightless one at the end.
+struct KernelLights {
+  static constexpr std::size_t count = 8;
+  std::array<std::array<double, count>, 9> columns;
+
+  explicit KernelLights(const Vector3& wo) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto number = static_cast<double>(i);
+      const Vector3 wi = direction(10 + 9 * number, 150 + 17 * number);
+      const FacetLight<double> at = facet_light(wi, Vector3((wi + wo).normalized()));
+      const std::array<double, 9> light = {at.n_wi,
+                                           at.wi_h,
+                                           at.sin2_h,
+                                           at.cos2_h,
+                                           0.1 * number,
+                                           0.3,
+                                           0.02 * number * number,
+                                           i + 1 < count ? 1 + number : 0,
+                                           0.5};
+      for (std::size_t k = 0; k < columns.size(); ++k) columns[k][i] = light[k];
+    }
+  }
+
+  FacetLight<double> at(std::size_t i) const {
+    return {columns[0][i], columns[1][i], columns[2][i], columns[3][i]};
+  }
+  PrincipledKernelLights pointers() const {
+    const auto& c = columns;
+    return {count,
+            {c[0].data(), c[1].data(), c[2].data(), c[3].data()},
+            {c[4].data(), c[5].data(), c[6].data()},
+            c[7].data(),
+            c[8].data()};
+  }
+};
+
+PrincipledKernelInput kernel_input(const KernelLights& lights, double n_wo) {
+  return {lights.pointers(),
+          principled_terms({0.35, 0.43, 0.31, 0.9}, n_wo),
+          {0.7, 0.4, 0.2},
+          {0.5, 0.9, 0.3},
+          0.1};
+}
+
+TEST(PrincipledKernel, SumsWhatTheFormulaGives) {
+  const Vector3 wo = direction(40, 170);
+  const KernelLights lights(wo);
+  const PrincipledKernelInput in = kernel_input(lights, wo.z());
+  const PrincipledKernelSums sums = run_principled_kernel(in);
+  using Slopes = Eigen::Matrix<double, PrincipledSlopes::count, 1>;
+  double error = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    Slopes gradient = Slopes::Zero();
+    Eigen::Matrix<double, PrincipledSlopes::count, PrincipledSlopes::count> matrix;
+    matrix.setZero();
+    for (std::size_t i = 0; i < KernelLights::count; ++i) {
+      const auto light = principled_light<true>(in.terms, lights.at(i));
+      const auto channel = principled_channel<true>(in.terms, lights.at(i), light, in.base_color[c],
+                                                    in.specular_tint[c]);
+      const double r = channel.value - in.lights.reflected[c][i];
+      const double e = in.smoothing * in.lights.typical[i], rounded = std::hypot(r, e);
+      const Slopes slopes = Eigen::Map<const Slopes>(channel.slopes);
+      error += in.lights.weight[i] * (rounded - e);
+      gradient += in.lights.weight[i] / rounded * r * slopes;
+      matrix += in.lights.weight[i] / rounded * slopes * slopes.transpose();
+    }
+    for (int j = 0; j < PrincipledSlopes::count; ++j) {
+      // Eight numbers are summed; rounding them in another order makes some 1e-15.
+      EXPECT_NEAR(sums.gradient[c][j], gradient[j], 1e-12 * gradient.norm());
+      for (int k = 0; k <= j; ++k) {
+        EXPECT_NEAR(sums.matrix[c][j][k], matrix(j, k), 1e-12 * matrix.norm());
+      }
+    }
+  }
+  EXPECT_NEAR(run_principled_error(in), error, 1e-12 * error);
+}
+
+TEST(PrincipledKernel, HasTheSameBitsInBothVersions) {
+  if (!has_avx2()) GTEST_SKIP() << "the processor has no AVX2, so there is one version alone";
+  const Vector3 wo = direction(40, 170);
+  const KernelLights lights(wo);
+  const PrincipledKernelInput in = kernel_input(lights, wo.z());
+  const PrincipledKernelSums fast = run_principled_kernel(in);
+  const double fast_error = run_principled_error(in);
+  const BaselineInstructions baseline;
+  const PrincipledKernelSums slow = run_principled_kernel(in);
+  for (int c = 0; c < 3; ++c) {
+    for (int j = 0; j < PrincipledSlopes::count; ++j) {
+      EXPECT_EQ(fast.gradient[c][j], slow.gradient[c][j]);
+      for (int k = 0; k <= j; ++k) EXPECT_EQ(fast.matrix[c][j][k], slow.matrix[c][j][k]);
+    }
+  }
+  EXPECT_EQ(fast_error, run_principled_error(in));
 }
 
 TEST(FitPrincipled, FindsTheMaterialThatATargetIsMadeOf) {
