@@ -126,4 +126,4 @@ def _set_path(material: bpy.types.Material, path: str) -> None:
 
     record = json.loads(material[KEY])
     record["source"]["path"] = str(Path(path).absolute())
-    material[KEY] = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    material[KEY] = json.dumps(record, allow_nan=False) + "\n"

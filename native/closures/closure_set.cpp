@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
 
 namespace lobefit {
 namespace {
@@ -28,7 +31,7 @@ Shape to_shape(const ClosureSockets& sockets, const Vector3& wo) {
 }
 
 ClosuresAtView::ClosuresAtView(const ClosureSet& closures, const Vector3& wo)
-    : diffuse_(at(closures.diffuse, wo.z()) / pi) {
+    : wo_(wo), diffuse_(at(closures.diffuse, wo.z()) / pi) {
   const double cosine = wo.z();
   if (pi * diffuse_.mean() < least_weight) diffuse_ = 0;
   for (const SpecularClosure& specular : closures.specular) {
@@ -50,6 +53,23 @@ Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vecto
   if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
   const auto [light, viewer] = turned_to_viewer(wi, wo);
   return ClosuresAtView(closures, viewer).evaluate(light, (light + viewer).normalized());
+}
+
+Reflectance closures_reflectance(ClosureSet closures) {
+  struct Seen {
+    std::shared_ptr<const ClosureSet> closures;
+    ClosuresAtView at_view;
+  };
+  return [shared = std::make_shared<const ClosureSet>(std::move(closures))](
+             const Vector3& wi, const Vector3& wo) -> Rgb {
+    static thread_local std::optional<Seen> last;
+    if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
+    const auto [light, viewer] = turned_to_viewer(wi, wo);
+    if (!last || last->closures != shared || last->at_view.wo() != viewer) {
+      last.emplace(shared, ClosuresAtView(*shared, viewer));
+    }
+    return last->at_view.evaluate(light, (light + viewer).normalized());
+  };
 }
 
 }  // namespace lobefit

@@ -45,10 +45,13 @@ class ClosuresAtView {
   // The viewer at wo in the xz plane, x >= 0, above the horizon.
   ClosuresAtView(const ClosureSet& closures, const Vector3& wo);
 
+  const Vector3& wo() const { return wo_; }
+
   // f cos(theta_i) for a light at wi above the horizon and the unit half vector of wi and wo.
   Rgb evaluate(const Vector3& wi, const Vector3& half) const;
 
  private:
+  Vector3 wo_;
   Rgb diffuse_;
   std::vector<std::pair<Microfacet, Rgb>> specular_;  // with their weights
 };
@@ -59,5 +62,8 @@ inline constexpr double least_weight = 1e-5;
 // f cos(theta_i) in 1/sr, as Cycles 4.2 and later evaluate it, for unit vectors toward the light
 // (wi) and the viewer (wo), n = +z; 0 below the horizon.
 Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo);
+// The same as a function, which reads the curves once for all lights that a thread asks about one
+// after the other for one view.
+Reflectance closures_reflectance(ClosureSet closures);
 
 }  // namespace lobefit

@@ -12,7 +12,7 @@ namespace lobefit {
 PrincipledTerms principled_terms(const SharedSockets& sockets, double n_wo) {
   using S = PrincipledSlopes;
   const auto& [metallic, roughness, root, tint] = sockets;
-  const double alpha2 = std::pow(roughness, 4);
+  const double alpha2 = square(square(roughness));
   PrincipledTerms t{};
   t.metallic = metallic;
   t.alpha2 = alpha2;

@@ -30,12 +30,23 @@ void keep_needed(const std::vector<ViewCurve::Point>& all, std::size_t from, std
 
 }  // namespace
 
+ViewCurve::ViewCurve(std::vector<Point> points) : points_(std::move(points)) {
+  if (constant()) return;
+  std::size_t next = 0;
+  for (int step = 0; step <= steps; ++step) {
+    while (next < points_.size() && points_[next].cosine < double(step) / steps) ++next;
+    first_.push_back(next);
+  }
+}
+
 double ViewCurve::operator()(double cosine) const {
-  const auto above = std::find_if(points_.begin(), points_.end(),
-                                  [=](const Point& point) { return point.cosine >= cosine; });
-  if (above == points_.begin()) return above->value;
-  if (above == points_.end()) return points_.back().value;
-  const Point &low = above[-1], &high = *above;
+  if (constant()) return points_.front().value;
+  const auto step = static_cast<std::size_t>(std::clamp(cosine, 0.0, 1.0) * steps);
+  std::size_t above = first_[step];
+  while (above < points_.size() && points_[above].cosine < cosine) ++above;
+  if (above == 0) return points_.front().value;
+  if (above == points_.size()) return points_.back().value;
+  const Point &low = points_[above - 1], &high = points_[above];
   const double share = (cosine - low.cosine) / (high.cosine - low.cosine);
   return low.value + share * (high.value - low.value);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -22,7 +23,7 @@ class ViewCurve {
   // The constant.
   explicit ViewCurve(double value) : points_{{0, value}} {}
   // At least one point, cosines from 0 to 1 ascending.
-  explicit ViewCurve(std::vector<Point> points) : points_(std::move(points)) {}
+  explicit ViewCurve(std::vector<Point> points);
 
   double operator()(double cosine) const;
   const std::vector<Point>& points() const { return points_; }
@@ -34,6 +35,8 @@ class ViewCurve {
 
  private:
   std::vector<Point> points_;
+  // Of each step of the tables, the first point that is not before it; empty of a constant.
+  std::vector<std::size_t> first_;
 };
 
 // The cubic B-splines in which curves are fitted: uniform in sqrt(cosine), so that they are finest

@@ -328,10 +328,6 @@ Reflectance principled_reflectance(const Principled& principled) {
       [=](const Vector3& wi, const Vector3& wo) { return evaluate_principled(principled, wi, wo); };
 }
 
-Reflectance closures_reflectance(const ClosureSet& closures) {
-  return [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
-}
-
 // A row of value, by_exponent and by_angle for each exponent and angle in degrees, (N) each.
 py::array_t<double> phong_energy_rows(bool modified, const DirectionArray& exponent,
                                       const DirectionArray& angle) {

@@ -19,6 +19,10 @@ double cosine_of(int step, int steps) {
 
 Rgb directional_albedo(const Reflectance& reflectance, double view_angle) {
   constexpr int rings = 180, sectors = 30;
+  // The plane of incidence is a plane of symmetry: half a turn is enough.
+  using Sectors = Eigen::Array<double, sectors, 1>;
+  const Sectors azimuth = Sectors::LinSpaced(0.5, sectors - 0.5) * (pi / sectors);
+  const Sectors cos_phi = azimuth.cos(), sin_phi = azimuth.sin();
   const Vector3 wo(std::sin(view_angle), 0, std::cos(view_angle));
   Rgb albedo = Rgb::Zero();
   for (int ring = 0; ring < rings; ++ring) {
@@ -27,9 +31,7 @@ Rgb directional_albedo(const Reflectance& reflectance, double view_angle) {
     const double theta_h = t * t * pi / 2, width = t * pi / rings;
     const double sin_h = std::sin(theta_h), cos_h = std::cos(theta_h);
     for (int sector = 0; sector < sectors; ++sector) {
-      // The plane of incidence is a plane of symmetry: half a turn is enough.
-      const double phi = (sector + 0.5) * pi / sectors;
-      const Vector3 half(sin_h * std::cos(phi), sin_h * std::sin(phi), cos_h);
+      const Vector3 half(sin_h * cos_phi[sector], sin_h * sin_phi[sector], cos_h);
       const double incidence = wo.dot(half);
       const Vector3 wi = 2 * incidence * half - wo;
       if (!(incidence > 0 && wi.z() > 0)) continue;

@@ -60,10 +60,6 @@ Reflectance reflectance_of(const ClosureSet& closures) {
   };
 }
 
-Reflectance f_times_cosine(const ClosureSet& closures) {
-  return [=](const Vector3& wi, const Vector3& wo) { return evaluate_closures(closures, wi, wo); };
-}
-
 FittedClosures fitted(const Target& target, const ClosureFitOptions& options) {
   Monitor monitor;
   return fit_closures(target, options, monitor);
@@ -223,6 +219,32 @@ TEST(Closures, TheViewMayStandAnywhere) {
   EXPECT_TRUE((evaluate_closures(closures, wi, -wo) == 0).all());
 }
 
+// A function of closures remembers the last view: another view, and other closures, are not it.
+TEST(Closures, AFunctionOfThemGivesWhatTheyGive) {
+  const ClosureSet closures = known_closures();
+  ClosureSet others = closures;
+  others.specular[0].roughness = ViewCurve(0.5);
+  const Reflectance f = closures_reflectance(closures), g = closures_reflectance(others);
+  const Vector3 first = at_angle(0.9, 2.1), second = at_angle(0.4);
+  for (const Vector3& wo : {first, first, second, Vector3(-second), first}) {
+    for (const double angle : {0.7, 0.2}) {
+      const Vector3 wi = at_angle(angle, 2.5);
+      EXPECT_TRUE((f(wi, wo) == evaluate_closures(closures, wi, wo)).all());
+      EXPECT_TRUE((g(wi, wo) == evaluate_closures(others, wi, wo)).all());
+    }
+  }
+}
+
+// Where a function is read, a step of the tables or a point between them, makes no difference.
+TEST(ClosuresViewCurve, IsLinearBetweenItsPoints) {
+  const ViewCurve curve({{0.1, 1}, {0.1017, 3}, {0.25, 2}, {0.9, 4}});
+  const std::pair<double, double> known[] = {{0, 1},         {0.1, 1},  {0.1017, 3},
+                                             {0.17585, 2.5}, {0.25, 2}, {0.251, 2 + 0.002 / 0.65},
+                                             {0.575, 3},     {0.9, 4},  {1, 4}};
+  for (const auto& [cosine, value] : known) EXPECT_NEAR(curve(cosine), value, 1e-12) << cosine;
+  EXPECT_EQ(ViewCurve(7.0)(0.3), 7);
+}
+
 TEST(ClosuresViewCurve, FollowsWithinItsTolerance) {
   const auto function = [](double c) { return std::sqrt(c) + 0.1 * std::sin(12 * c); };
   std::size_t most = 258;
@@ -295,9 +317,9 @@ TEST(ClosuresTarget, ScaleCountsForNothing) {
   const Target target = sample_target(f);
   const Target scaled =
       sample_target([&](const Vector3& wi, const Vector3& wo) { return Rgb(1000 * f(wi, wo)); });
-  EXPECT_LT(error_of(target, f_times_cosine(closures)), 1e-12);
+  EXPECT_LT(error_of(target, closures_reflectance(closures)), 1e-12);
   closures.specular[0].roughness = ViewCurve(0.5);
-  const double error = error_of(target, f_times_cosine(closures));
+  const double error = error_of(target, closures_reflectance(closures));
   EXPECT_GT(error, 0.1);
   EXPECT_NEAR(error_of(scaled,
                        [&](const Vector3& wi, const Vector3& wo) {
@@ -311,9 +333,9 @@ TEST(ClosuresTarget, AThinnedOneStandsForTheWhole) {
   const Target target = sample_target(reflectance_of(known));
   ClosureSet other = known;
   other.specular[0].roughness = ViewCurve(0.5);
-  const double error = error_of(target, f_times_cosine(other));
+  const double error = error_of(target, closures_reflectance(other));
   // Broad lobes on a 15th of the samples: the sums differ by less than the views do.
-  EXPECT_NEAR(error_of(thinned(target, 3, 5), f_times_cosine(other)), error, 0.1 * error);
+  EXPECT_NEAR(error_of(thinned(target, 3, 5), closures_reflectance(other)), error, 0.1 * error);
   EXPECT_EQ(thinned(target, 3, 1).size(), target.size() / 3);
 }
 

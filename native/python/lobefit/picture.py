@@ -47,8 +47,10 @@ def shrink(image: Image, factor: int) -> Image:
     """The image in 1/factor of its size, each pixel the mean of factor x factor."""
     rows, columns = image.shape[0] // factor, image.shape[1] // factor
     cut = image[: rows * factor, : columns * factor]
-    means: Image = cut.reshape(rows, factor, columns, factor, -1).mean((1, 3), np.float32)
-    return means
+    steps = range(factor)
+    # Sums of whole pictures: numpy's mean over two short axes takes six times as long.
+    means: Image = sum(cut[row::factor, column::factor] for row in steps for column in steps)
+    return means / np.float32(factor * factor)
 
 
 def page(rows: int, columns: int, color: ArrayLike) -> Image:

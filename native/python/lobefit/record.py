@@ -151,8 +151,12 @@ class Record(Fit):
         return shlex.join(words)
 
     def to_json(self) -> str:
-        """The record as JSON; every number is exact when read back."""
-        return json.dumps(dataclasses.asdict(self), indent=1, allow_nan=False) + "\n"
+        """The record as JSON, an entry a line; every number is exact when read back."""
+        lines = (
+            f'"{name}": {json.dumps(value, allow_nan=False, default=_entries)}'
+            for name, value in _entries(self).items()
+        )
+        return "{" + ",\n".join(lines) + "}\n"
 
     @classmethod
     def from_json(cls, text: str | bytes, name: str = "record") -> "Record":
@@ -194,6 +198,11 @@ def _processor() -> str:
         lines = []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return named[0] if named else platform.processor() or platform.machine()
+
+
+def _entries(item: Any) -> dict[str, Any]:
+    """What a dataclass holds, by name."""
+    return {name: getattr(item, name) for name in _names(type(item))}
 
 
 def _names(kind: type) -> list[str]:
