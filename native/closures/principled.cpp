@@ -12,12 +12,13 @@ namespace lobefit {
 PrincipledTerms principled_terms(const SharedSockets& sockets, double n_wo) {
   using S = PrincipledSlopes;
   const auto& [metallic, roughness, root, tint] = sockets;
-  const double alpha2 = square(square(roughness));
+  // Cycles takes anything narrower for a mirror; its lobe is black, whatever stands for its alpha.
+  const bool mirror = square(square(roughness)) <= 2e-10;
+  const double alpha2 = mirror ? 1 : square(square(roughness));
   PrincipledTerms t{};
   t.metallic = metallic;
   t.alpha2 = alpha2;
-  // Cycles takes anything narrower for a mirror.
-  t.scale = alpha2 > 2e-10 ? 1 / (2 * pi * n_wo) : 0;
+  t.scale = mirror ? 0 : 1 / (2 * pi * n_wo);
   const double spread = alpha2 * (1 - n_wo * n_wo) / (n_wo * n_wo);
   t.masking_o = std::sqrt(1 + spread);
   t.masking_o_by_log_roughness = 2 * spread / t.masking_o;

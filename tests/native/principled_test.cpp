@@ -82,6 +82,16 @@ TEST(Principled, DielectricFacingItsLightReflectsTintedF0) {
   EXPECT_TRUE(value.isApprox(0.04 * tint / (4 * pi * std::pow(0.5, 4)), 1e-12)) << value;
 }
 
+TEST(Principled, AMirrorShowsNoLightOfSizeZero) {
+  const Vector3 n = Vector3::UnitZ();
+  const Principled metal = principled(Rgb::Ones(), 1, 0, 1.5, Rgb::Ones());
+  EXPECT_TRUE((evaluate_principled(metal, n, n) == 0).all());
+  const Principled coated = principled(Rgb::Ones(), 0, 0, 1.5, Rgb::Ones());
+  const Rgb diffuse = evaluate_principled(coated, n, n);
+  // All but the coat's 4 % at normal incidence, of 1 / pi.
+  EXPECT_TRUE(diffuse.isApproxToConstant(0.96 / pi, 1e-3)) << diffuse;
+}
+
 TEST(Principled, IsZeroBelowTheHorizon) {
   const Principled material = principled(Rgb::Ones(), 0.5, 0.5, 1.5, Rgb::Ones());
   EXPECT_TRUE((evaluate_principled(material, direction(95, 0), direction(20, 0)) == 0).all());
