@@ -8,7 +8,9 @@ the step, tells what was their own where the machine has other work too.
 """
 
 import argparse
+import os
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -96,6 +98,9 @@ def main() -> None:
         f"median {statistics.median(seconds):.2f} s, {statistics.median(spent):.2f} s of processors"
     )
     print(f"longest step {max(stalls) * 1e3:.0f} ms, {max(own) * 1e3:.0f} ms of the processor")
+    # bpy 4.5 may crash or hang at its exit where any class is registered.
+    sys.stdout.flush()
+    os._exit(0)
 
 
 if __name__ == "__main__":
