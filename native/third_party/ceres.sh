@@ -27,10 +27,11 @@ fi
 tar -xf "$source"
 
 # Only what a small dense problem needs. CUDA must be named, because Ceres links it where it finds
-# it. At log level -3 the bundled miniglog prints nothing but the reason of an abort.
+# it. At log level -3 the bundled miniglog prints nothing but the reason of an abort, with the source
+# file, whose folder is left out: wheels are the same wherever they are built.
 cmake -S ceres-solver-*/ -B build -G Ninja --log-level=WARNING -Wno-dev \
     -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX="$prefix" -DCMAKE_INSTALL_LIBDIR=lib \
-    -DCMAKE_CXX_STANDARD=17 -DCMAKE_CXX_FLAGS='-ffunction-sections -fdata-sections -w' \
+    -DCMAKE_CXX_STANDARD=17 -DCMAKE_CXX_FLAGS="-ffunction-sections -fdata-sections -w '-ffile-prefix-map=$work=.'" \
     -DCMAKE_CXX_VISIBILITY_PRESET=hidden -DCMAKE_VISIBILITY_INLINES_HIDDEN=ON \
     -DBUILD_SHARED_LIBS=OFF -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
     -DMINIGLOG=ON -DMINIGLOG_MAX_LOG_LEVEL=-3 -DGFLAGS=OFF \
