@@ -5,9 +5,8 @@ set -eu
 
 target=$1 folder=$2
 here=$(cd "$(dirname "$0")" && pwd)
-stamp=$folder/made-by
 script_sum=$(sha256sum <"$0")
-[ "$(cat "$stamp" 2>/dev/null)" != "$script_sum" ] || exit 0
+[ "$(cat "$folder/made-by" 2>/dev/null)" != "$script_sum" ] || exit 0
 
 rm -rf "$folder"
 mkdir -p "$folder"
@@ -46,4 +45,4 @@ linux-arm64) fetch_linux_arm64 ;;
 windows-x64) fetch_windows_x64 ;;
 esac
 rm -rf cache lists ./*.deb python3.11_*
-echo "$script_sum" >"$stamp"
+echo "$script_sum" >made-by
