@@ -66,7 +66,7 @@ Reflectance closures_reflectance(ClosureSet closures) {
     if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
     const auto [light, viewer] = turned_to_viewer(wi, wo);
     if (!last || last->closures != shared || last->at_view.wo() != viewer) {
-      last.emplace(shared, ClosuresAtView(*shared, viewer));
+      last = Seen{shared, ClosuresAtView(*shared, viewer)};
     }
     return last->at_view.evaluate(light, (light + viewer).normalized());
   };
