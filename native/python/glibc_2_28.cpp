@@ -58,6 +58,8 @@ int pthread_join(pthread_t thread, void** result) { return first_pthread_join(th
 int pthread_once(pthread_once_t* once, Routine routine) {
   return first_pthread_once(once, routine);
 }
+// These names are glibc's own, which nobody else may take: that is what they are here for.
+// NOLINTNEXTLINE(bugprone-reserved-identifier)
 int __pthread_key_create(pthread_key_t* key, Destructor destructor) noexcept {
   return first___pthread_key_create(key, destructor);
 }
@@ -81,6 +83,7 @@ int stat(const char* path, struct stat* found) noexcept {
 }
 
 // New in 2.32: tells shared_ptr that it need not count atomically. It always shall.
+// NOLINTNEXTLINE(bugprone-reserved-identifier)
 char __libc_single_threaded = 0;
 
 }  // extern "C"
