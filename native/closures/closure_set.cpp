@@ -49,12 +49,6 @@ Rgb ClosuresAtView::evaluate(const Vector3& wi, const Vector3& half) const {
   return result;
 }
 
-Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo) {
-  if (!(wi.z() > 0 && wo.z() > 0)) return Rgb::Zero();
-  const auto [light, viewer] = turned_to_viewer(wi, wo);
-  return ClosuresAtView(closures, viewer).evaluate(light, (light + viewer).normalized());
-}
-
 Reflectance closures_reflectance(ClosureSet closures) {
   struct Seen {
     std::shared_ptr<const ClosureSet> closures;

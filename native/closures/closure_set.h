@@ -60,10 +60,8 @@ class ClosuresAtView {
 inline constexpr double least_weight = 1e-5;
 
 // f cos(theta_i) in 1/sr, as Cycles 4.2 and later evaluate it, for unit vectors toward the light
-// (wi) and the viewer (wo), n = +z; 0 below the horizon.
-Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo);
-// The same as a function, which reads the curves once for all lights that a thread asks about one
-// after the other for one view.
+// (wi) and the viewer (wo), n = +z; 0 below the horizon. The curves are read once for all lights
+// that a thread asks about one after the other for one view.
 Reflectance closures_reflectance(ClosureSet closures);
 
 }  // namespace lobefit

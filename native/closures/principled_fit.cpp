@@ -223,27 +223,26 @@ Vector descend(const Views& views, Vector x, double smoothing, int iterations) {
   return x;
 }
 
-// Calls visit(lights, i) for every light of the views.
+// Calls visit(lights, i) for every light of a view but its padding.
 template <typename Visitor>
-void visit_lights(const Views& views, Visitor&& visit) {
-  for (const View* view : views.all) {
-    const PrincipledKernelLights lights = view->lights();
-    for (std::size_t i = 0; i < lights.count; ++i) {
-      const bool padding = !(lights.weight[i] > 0);
-      if (!padding) visit(*view, lights, i);
-    }
+void visit_lights(const View& view, Visitor&& visit) {
+  const PrincipledKernelLights lights = view.lights();
+  for (std::size_t i = 0; i < lights.count; ++i) {
+    if (lights.weight[i] > 0) visit(lights, i);
   }
 }
 
 // The median colour of the target away from its highlight, as the albedo of a diffuse surface.
 Rgb diffuse_albedo(const Views& views) {
   std::array<std::vector<double>, 3> values;
-  visit_lights(views, [&](const View&, const PrincipledKernelLights& lights, std::size_t i) {
-    if (!(lights.at.cos2_h[i] < 0.6)) return;
-    for (std::size_t c = 0; c < 3; ++c) {
-      values[c].push_back(pi * lights.reflected[c][i] / lights.at.n_wi[i]);
-    }
-  });
+  for (const View* view : views.all) {
+    visit_lights(*view, [&](const PrincipledKernelLights& lights, std::size_t i) {
+      if (!(lights.at.cos2_h[i] < 0.6)) return;
+      for (std::size_t c = 0; c < 3; ++c) {
+        values[c].push_back(pi * lights.reflected[c][i] / lights.at.n_wi[i]);
+      }
+    });
+  }
   Rgb albedo = Rgb::Constant(0.5);
   for (std::size_t c = 0; c < 3 && !values[c].empty(); ++c) {
     const auto middle = values[c].begin() + static_cast<std::ptrdiff_t>(values[c].size() / 2);
@@ -253,26 +252,36 @@ Rgb diffuse_albedo(const Views& views) {
   return albedo;
 }
 
-// The colours of the metal of this roughness that returns the target's light.
-Rgb metal_colour(const Views& views, double roughness) {
-  Rgb wanted = Rgb::Zero();
-  double given = 0;
-  visit_lights(views, [&](const View& view, const PrincipledKernelLights& lights, std::size_t i) {
-    const PrincipledTerms terms = principled_terms({1, roughness, 0, 1}, view.n_wo());
-    const FacetLight<double> at = {lights.at.n_wi[i], lights.at.wi_h[i], lights.at.sin2_h[i],
-                                   lights.at.cos2_h[i]};
-    given += lights.weight[i] * ggx_lobe<false>(terms, at).value;
-    wanted += lights.weight[i] *
-              Rgb(lights.reflected[0][i], lights.reflected[1][i], lights.reflected[2][i]);
-  });
-  return (wanted / given).cwiseMin(1);
+// The light that the target reflects.
+Rgb reflected_light(const Views& views) {
+  Rgb sum = Rgb::Zero();
+  for (const View* view : views.all) {
+    visit_lights(*view, [&](const PrincipledKernelLights& lights, std::size_t i) {
+      for (int c = 0; c < 3; ++c) sum[c] += lights.weight[i] * lights.reflected[c][i];
+    });
+  }
+  return sum;
+}
+
+// And that a white metal of this roughness would.
+double white_metal_light(const Views& views, double roughness) {
+  double sum = 0;
+  for (const View* view : views.all) {
+    const PrincipledTerms terms = principled_terms({1, roughness, 0, 1}, view->n_wo());
+    visit_lights(*view, [&](const PrincipledKernelLights& lights, std::size_t i) {
+      const FacetLight<double> at = {lights.at.n_wi[i], lights.at.wi_h[i], lights.at.sin2_h[i],
+                                     lights.at.cos2_h[i]};
+      sum += lights.weight[i] * ggx_lobe<false>(terms, at).value;
+    });
+  }
+  return sum;
 }
 
 // Where the search begins, 32 points: from sharp to rough a dielectric over a diffuse surface, a
 // metal, both in equal parts, and a coat so dense that its tint is the colour of a highlight that
 // pales at grazing angles. The colours return the target's light.
 std::vector<Vector> starts(const Views& views) {
-  const Rgb albedo = diffuse_albedo(views);
+  const Rgb albedo = diffuse_albedo(views), light = reflected_light(views);
   std::vector<Vector> all;
   for (const double roughness : {0.04, 0.07, 0.12, 0.2, 0.3, 0.45, 0.65, 0.9}) {
     const auto start = [&](const Rgb& base_color, const Rgb& specular_tint, double metal,
@@ -282,7 +291,7 @@ std::vector<Vector> starts(const Views& views) {
           reflectance_root;
       return x;
     };
-    const Rgb metal = metal_colour(views, roughness);
+    const Rgb metal = (light / white_metal_light(views, roughness)).cwiseMin(1);
     all.push_back(start(albedo, Rgb::Ones(), 0, 0.2));
     all.push_back(start(metal, Rgb::Constant(0.8), 1, 0.2));
     all.push_back(start((metal + albedo) / 2, Rgb::Constant(0.8), 0.5, 0.2));

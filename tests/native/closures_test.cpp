@@ -53,6 +53,11 @@ ClosureSet known_closures() {
   return {grey(0), {closure}};
 }
 
+// By a function of its own, which remembers nothing.
+Rgb evaluate_closures(const ClosureSet& closures, const Vector3& wi, const Vector3& wo) {
+  return closures_reflectance(closures)(wi, wo);
+}
+
 // f of closures: a target is without the light's cosine.
 Reflectance reflectance_of(const ClosureSet& closures) {
   return [=](const Vector3& wi, const Vector3& wo) {

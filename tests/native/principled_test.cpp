@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -13,6 +14,7 @@
 #include "measurement/instructions.h"
 #include "perturb_principled.h"
 #include "reflectance/abc.h"
+#include "reflectance/fresnel.h"
 
 namespace lobefit {
 namespace {
@@ -157,6 +159,19 @@ TEST(Principled, DerivativesAreThoseOfTheValues) {
         // What a step of 1e-5 leaves out is the third derivative's, at most some hundreds here.
         EXPECT_NEAR(channel.slopes[i], slope, 1e-7) << "derivative by unknown " << i;
       }
+    }
+  }
+}
+
+// The formula for lanes and the project's other one of Fresnel's reflectance cannot part.
+TEST(Principled, SchlickWeightIsThatOfFresnelsReflectance) {
+  for (const double root : {1e-6, 0.02, 0.2, 0.75, 0.98}) {
+    const double ior = (1 + root) / (1 - root), f0 = root * root;
+    for (const double cosine : {1e-3, 0.2, 0.5, 0.9, 1.0}) {
+      const FresnelReflectance fresnel = fresnel_reflectance(cosine, ior);
+      const auto weight = schlick_weight<true>(dielectric_terms(root), cosine);
+      // At normal incidence what is 0 is the difference of numbers near 1, or held at 0.
+      EXPECT_NEAR(weight.value, std::max((fresnel.value - f0) / (1 - f0), 0.0), 1e-12);
     }
   }
 }
