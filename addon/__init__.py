@@ -4,12 +4,20 @@ The wheel carries the same folder as the package `lobefit_addon`, which builds m
 being registered: `lobefit_addon.build_material(record)`.
 """
 
+from typing import Any
+
 import bpy
 
-from . import cli, native, operators, panels, preferences
-from .nodes.material import add_to_tree, build_material, fill_material
+from . import cli, native, nodes, operators, panels, preferences
 
-__all__ = ["add_to_tree", "build_material", "fill_material", "register", "unregister"]
+_BUILDERS = ("add_to_tree", "build_material", "fill_material")
+__all__ = [*_BUILDERS, "register", "unregister"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _BUILDERS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(nodes.material, name)
 
 
 def register() -> None:

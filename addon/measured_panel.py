@@ -2,15 +2,13 @@
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 
-from . import native, pictures
+from . import native, nodes, pictures
 from .layouts import draw_paragraph, draw_problem, draw_progress
 from .locks import lock_of
-from .nodes.material import Choice, shown_by
-from .nodes.principled import SOCKETS
 from .operators.fit import LOBEFIT_OT_fit
 from .operators.kind import LOBEFIT_OT_set_kind
 from .operators.manual import LOBEFIT_OT_open_manual
@@ -31,6 +29,9 @@ from .parameters import is_edited, parameter_nodes
 from .properties import KINDS, MODELS, draw_kind_options, draw_model_options, last_options
 from .records import KIND_KEY, active_material, damage_of, entries_of, record_of, source_file
 from .versions import is_newer, is_outdated
+
+if TYPE_CHECKING:
+    from .nodes.material import Choice
 
 TITLE = "Measured BRDF"
 # Up to which part of the reflected light that is off, what to call a fit.
@@ -66,7 +67,7 @@ class LOBEFIT_PT_measured_brdf(bpy.types.Panel):
             draw_paragraph(body, problem, "ERROR", context)
             return
         record = told_record(record_of(material))
-        choice = shown_by(material, record)
+        choice = nodes.material.shown_by(material, record)
         _draw_origin(body, context, material)
         _draw_spheres(body, context, material)
         _draw_error(body, context, material, record, choice)
@@ -89,7 +90,7 @@ def told_record(entries: dict[str, Any]) -> SimpleNamespace:
     return SimpleNamespace(**{"closures": [], "error_by_angle": None, **entries})
 
 
-def draw_closeness(layout: Any, context: bpy.types.Context, record: Any, choice: Choice) -> None:
+def draw_closeness(layout: Any, context: bpy.types.Context, record: Any, choice: "Choice") -> None:
     """How far what is shown is off, and what the fit warns of."""
     kind = {key: label for key, label, _ in KINDS}[choice.kind]
     plural = "" if choice.count == 1 else "s"
@@ -167,7 +168,7 @@ def _draw_error(
     context: bpy.types.Context,
     material: bpy.types.Material,
     record: Any,
-    choice: Choice,
+    choice: "Choice",
 ) -> None:
     draw_closeness(layout, context, record, choice)
     if is_edited(material, vars(record), choice.kind):
@@ -211,15 +212,15 @@ def _draw_parameters(
     layout: Any, context: bpy.types.Context, material: bpy.types.Material, record: Any
 ) -> None:
     kind = material.get(KIND_KEY, "live")
-    nodes = parameter_nodes(material, kind)
+    found = parameter_nodes(material, kind)
     column = _split_column(layout)
-    for node in nodes:
+    for node in found:
         for socket in node.inputs if kind != "principled" else _first(node):
             if socket.is_linked:
                 column.label(text=f"{socket.name}: from another node", icon="NODE")
             elif not socket.hide_value:
                 column.prop(socket, "default_value", text=socket.name)
-    if not nodes:
+    if not found:
         draw_paragraph(layout, "Its nodes are no longer those of the fit.", "INFO", context)
     if kind != "live":
         draw_fitted(layout, record)
@@ -231,7 +232,7 @@ def _draw_parameters(
 
 def _first(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
     """Those of the many inputs of a Principled BSDF that a record tells."""
-    return [node.inputs[name] for name in SOCKETS.values()]
+    return [node.inputs[name] for name in nodes.principled.SOCKETS.values()]
 
 
 def draw_fitted(layout: Any, record: Any) -> None:

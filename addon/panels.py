@@ -4,6 +4,7 @@ from typing import Any, ClassVar
 
 import bpy
 
+from . import nodes
 from .layouts import draw_paragraph, draw_problem, draw_progress
 from .measured_panel import (
     TITLE,
@@ -12,7 +13,6 @@ from .measured_panel import (
     draw_fitted,
     told_record,
 )
-from .nodes.material import BAKED, shown_by
 from .operators.add_live import LOBEFIT_OT_add_live
 from .operators.classic import (
     LOBEFIT_OT_make_classic,
@@ -23,7 +23,7 @@ from .operators.import_measured import LOBEFIT_OT_import_measured
 from .operators.run import current
 from .operators.simplify import LOBEFIT_OT_restore_scene, LOBEFIT_OT_simplify_scene
 from .properties import draw_simplify_options
-from .records import active_material, is_simplified, record_of, result_of
+from .records import BAKED, active_material, is_simplified, record_of, result_of
 from .targets import shows_material
 
 
@@ -97,7 +97,7 @@ class LOBEFIT_PT_shader_editor(bpy.types.Panel):
         entries = record_of(node)
         if entries is not None:
             record = told_record(entries)
-            draw_closeness(self.layout, context, record, shown_by(node, record))
+            draw_closeness(self.layout, context, record, nodes.material.shown_by(node, record))
             draw_fitted(self.layout, record)
         column = self.layout.column()
         column.operator(LOBEFIT_OT_import_measured.bl_idname, icon="IMPORT")

@@ -9,11 +9,8 @@ from typing import Any
 
 import bpy
 
-from .nodes.baked import is_baked
-from .nodes.live import VERSION_KEY as LIVE_KEY
-from .nodes.live import live_inputs, normal_albedo
-from .nodes.material import BAKED
-from .nodes.principled import SOCKETS, principled_inputs
+from . import nodes
+from .records import BAKED
 
 _AS_BAKED = {"Tint": [1.0, 1.0, 1.0], "Strength": 1.0}
 _EQUAL = 1e-5  # of values that are the same but for single precision
@@ -21,41 +18,43 @@ _EQUAL = 1e-5  # of values that are the same but for single precision
 
 def parameter_nodes(material: bpy.types.Material, kind: str) -> list[bpy.types.Node]:
     """The nodes that show the kind in a material, as far as they are still there."""
-    nodes = material.node_tree.nodes if material.node_tree else ()
+    found = material.node_tree.nodes if material.node_tree else ()
     if kind == "principled":
-        return [node for node in nodes if node.bl_idname == "ShaderNodeBsdfPrincipled"][:1]
-    groups = [node for node in nodes if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
+        return [node for node in found if node.bl_idname == "ShaderNodeBsdfPrincipled"][:1]
+    groups = [node for node in found if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
     if kind in BAKED:
-        return [node for node in groups if is_baked(node)]
-    return [node for node in groups if LIVE_KEY in node.node_tree]
+        return [node for node in groups if nodes.baked.is_baked(node)]
+    return [node for node in groups if nodes.live.VERSION_KEY in node.node_tree]
 
 
 def recorded_inputs(record: Mapping[str, Any], kind: str, count: int) -> list[dict[str, Any]]:
     """What the inputs of `count` such nodes are made with, by the names of their sockets."""
     if kind == "principled":
-        return [principled_inputs(record["principled"])]
+        return [nodes.principled.principled_inputs(record["principled"])]
     if kind in BAKED:
         return [dict(_AS_BAKED)] * count
     # Of versions of the group from 3 on.
-    return [inputs | {"Conserve Energy": 0.0} for inputs in live_inputs(record["parameters"])]
+    return [
+        inputs | {"Conserve Energy": 0.0} for inputs in nodes.live.live_inputs(record["parameters"])
+    ]
 
 
 def is_edited(material: bpy.types.Material, record: Mapping[str, Any], kind: str) -> bool:
     """Whether a parameter has another value than the record tells, or comes from another node."""
-    nodes = parameter_nodes(material, kind)
-    recorded = recorded_inputs(record, kind, len(nodes))
-    if len(nodes) != len(recorded) or not nodes:
+    found = parameter_nodes(material, kind)
+    recorded = recorded_inputs(record, kind, len(found))
+    if len(found) != len(recorded) or not found:
         return True
-    return any(map(_differs, nodes, recorded))
+    return any(map(_differs, found, recorded))
 
 
 def reset(material: bpy.types.Material, record: Mapping[str, Any], kind: str) -> bool:
     """Gives all parameters the values of the record; False where nodes of it are missing."""
-    nodes = parameter_nodes(material, kind)
-    recorded = recorded_inputs(record, kind, len(nodes))
-    if len(nodes) != len(recorded) or not nodes:
+    found = parameter_nodes(material, kind)
+    recorded = recorded_inputs(record, kind, len(found))
+    if len(found) != len(recorded) or not found:
         return False
-    for node, values in zip(nodes, recorded, strict=True):
+    for node, values in zip(found, recorded, strict=True):
         for socket, value in _sockets(node, values):
             for link in tuple(socket.links):
                 material.node_tree.links.remove(link)
@@ -73,10 +72,10 @@ def edited_shown(
     """
     way, what = shown
     kind = what["target"] if way == "closures" else way
-    nodes = parameter_nodes(material, kind)
-    if len(nodes) != 1 or any(s.is_linked for s in nodes[0].inputs if s.name != "Normal"):
+    found = parameter_nodes(material, kind)
+    if len(found) != 1 or any(s.is_linked for s in found[0].inputs if s.name != "Normal"):
         return None
-    values = {s.name: _plain(s) for s in nodes[0].inputs if hasattr(s, "default_value")}
+    values = {s.name: _plain(s) for s in found[0].inputs if hasattr(s, "default_value")}
     told = _TOLD[way](what, values)
     return told and (way, told)
 
@@ -86,7 +85,7 @@ def _live(parameters: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str,
     if values["Fresnel"] not in (0.0, 1.0) or values.get("Conserve Energy", 0.0) > 0:
         return None
     exponent, interpolation = values["Exponent"], values["Interpolation"]
-    scale = values["Specular Strength"] / normal_albedo(exponent, interpolation)
+    scale = values["Specular Strength"] / nodes.live.normal_albedo(exponent, interpolation)
     return {
         "model": "interpolated",
         "diffuse": values["Base Color"],
@@ -98,7 +97,9 @@ def _live(parameters: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str,
 
 
 def _principled(principled: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    return dict(principled) | {name: values[socket] for name, socket in SOCKETS.items()}
+    return dict(principled) | {
+        name: values[socket] for name, socket in nodes.principled.SOCKETS.items()
+    }
 
 
 def _baked(entry: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

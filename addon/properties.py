@@ -10,8 +10,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from .nodes.material import BAKED
 from .preferred import take_preferred
+from .records import BAKED
 
 MODELS = (
     ("interpolated", "Interpolated", "A blend of the two others, and closer than both"),

@@ -19,6 +19,8 @@ SCHEMA = 1
 VERSION_KEY, VERSION = "lobefit_version", 1
 # What the material shows: its kind and the number of its specular closures.
 KIND_KEY, COUNT_KEY = "lobefit_kind", "lobefit_closures"
+# The kinds that show closures of a record, which has them under these names.
+BAKED = ("lobe", "measured")
 # Whether light that bounced off a diffuse surface meets a diffuse closure only.
 BOUNCES_KEY = "lobefit_diffuse_bounces"
 # What a simplified material showed before, as the options of `fill_material`.

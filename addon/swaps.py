@@ -4,8 +4,8 @@ from typing import Any
 
 import bpy
 
-from .nodes.material import BAKED, build_material, discard, fill_material
-from .records import BEFORE_KEY, COUNT_KEY, KIND_KEY, has_bounces, is_simplified
+from .nodes.material import build_material, discard, fill_material
+from .records import BAKED, BEFORE_KEY, COUNT_KEY, KIND_KEY, has_bounces, is_simplified
 from .ways import Way
 
 _COMPARED = ".lobefit as built"  # a material that is there only to be compared with

@@ -4,8 +4,8 @@ from typing import Any
 
 import bpy
 
+from . import nodes
 from .locks import lock_of
-from .nodes.material import add_to_tree
 
 
 class SlotTarget:
@@ -92,5 +92,5 @@ class TreeTarget:
         if not found:
             return "The edited node tree was removed while the fit was under way."
         tree = found[0] if self._owners == "node_groups" else found[0].node_tree
-        add_to_tree(tree, record, self._location, **options)
+        nodes.material.add_to_tree(tree, record, self._location, **options)
         return ""

@@ -4,13 +4,18 @@ from typing import Any
 
 import bpy
 
-from .nodes.baked import baked_group
-from .nodes.live import VERSION as LIVE_VERSION
-from .nodes.live import VERSION_KEY as LIVE_KEY
-from .nodes.live import live_group
-from .nodes.material import BAKED, fill_material, shown_by
+from . import nodes
 from .parameters import parameter_nodes
-from .records import KIND_KEY, SCHEMA, VERSION, VERSION_KEY, entries_of, has_bounces, record_of
+from .records import (
+    BAKED,
+    KIND_KEY,
+    SCHEMA,
+    VERSION,
+    VERSION_KEY,
+    entries_of,
+    has_bounces,
+    record_of,
+)
 
 
 def is_outdated(material: bpy.types.Material) -> bool:
@@ -19,8 +24,11 @@ def is_outdated(material: bpy.types.Material) -> bool:
         return False
     if material.get(VERSION_KEY, 0) < VERSION:
         return True
-    nodes = parameter_nodes(material, material.get(KIND_KEY, "live"))
-    return any(node.node_tree.get(LIVE_KEY, LIVE_VERSION) < LIVE_VERSION for node in _groups(nodes))
+    live = nodes.live
+    groups = _groups(parameter_nodes(material, material.get(KIND_KEY, "live")))
+    return any(
+        group.node_tree.get(live.VERSION_KEY, live.VERSION) < live.VERSION for group in groups
+    )
 
 
 def is_newer(material: bpy.types.Material) -> bool:
@@ -35,21 +43,23 @@ def update(material: bpy.types.Material, record: Any) -> None:
     Values of the groups' inputs stay, and what is linked to them. Raises ValueError where the
     record does not hold what the material shows.
     """
-    choice = shown_by(material, record)
-    nodes = _groups(parameter_nodes(material, choice.kind))
-    if choice.kind == "live" and nodes:
-        for node in nodes:
-            _exchange(node, live_group())
-    elif choice.closures is not None and len(nodes) == 1:
-        _exchange(nodes[0], baked_group(nodes[0].node_tree.name, choice.closures))
+    choice = nodes.material.shown_by(material, record)
+    groups = _groups(parameter_nodes(material, choice.kind))
+    if choice.kind == "live" and groups:
+        for node in groups:
+            _exchange(node, nodes.live.live_group())
+    elif choice.closures is not None and len(groups) == 1:
+        _exchange(groups[0], nodes.baked.baked_group(groups[0].node_tree.name, choice.closures))
     elif choice.kind != "principled":
         count = choice.count if choice.kind in BAKED else None
-        fill_material(material, record, choice.kind, count, diffuse_bounces=has_bounces(material))
+        nodes.material.fill_material(
+            material, record, choice.kind, count, diffuse_bounces=has_bounces(material)
+        )
     material[VERSION_KEY] = VERSION
 
 
-def _groups(nodes: list[bpy.types.Node]) -> list[bpy.types.Node]:
-    return [node for node in nodes if node.bl_idname == "ShaderNodeGroup"]
+def _groups(found: list[bpy.types.Node]) -> list[bpy.types.Node]:
+    return [node for node in found if node.bl_idname == "ShaderNodeGroup"]
 
 
 def _exchange(node: bpy.types.Node, group: bpy.types.NodeTree) -> None:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import bpy
 
 from ..records import (
+    BAKED,
     BEFORE_KEY,
     BOUNCES_KEY,
     COUNT_KEY,
@@ -21,8 +22,6 @@ from .principled import principled_node
 from .tree import empty_shader_tree
 
 KINDS = ("live", "lobe", "measured", "principled", "auto")
-# Whose closures in a record each baked kind shows.
-BAKED = ("lobe", "measured")
 # Up to which part of the light that is off `auto` takes a kind, if nothing else is asked for.
 TOLERANCE = 0.05
 # View angles from here on, in degrees, are grazing.

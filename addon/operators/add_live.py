@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 import bpy
 from bpy.props import FloatVectorProperty
 
+from .. import nodes
 from ..locks import lock_of
-from ..nodes.live import NAME, live_group
 from ..targets import cursor_location, edited, shows_material
 
 
@@ -43,8 +43,8 @@ class LOBEFIT_OT_add_live(bpy.types.Operator):
         for node in tree.nodes:
             node.select = False
         node = tree.nodes.new("ShaderNodeGroup")
-        node.node_tree = live_group()
-        node.name = node.label = NAME
+        node.node_tree = nodes.live.live_group()
+        node.name = node.label = nodes.live.NAME
         node.width, node.location = 200.0, self.location
         tree.nodes.active = node
         return {"FINISHED"}
@@ -54,4 +54,4 @@ def draw_menu(self: Any, context: bpy.types.Context) -> None:
     """The entry in Add of the shader editor."""
     if shows_material(context.space_data):
         self.layout.separator()
-        self.layout.operator(LOBEFIT_OT_add_live.bl_idname, text=NAME)
+        self.layout.operator(LOBEFIT_OT_add_live.bl_idname, text=nodes.live.NAME)

@@ -7,8 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import bpy
 from mathutils import Vector
 
-from ..nodes.classic import LIGHTS, NAME, classic_group, is_classic, light_socket
-from ..nodes.tree import empty_shader_tree
+from .. import nodes
 from ..records import active_material
 
 
@@ -35,13 +34,13 @@ class LOBEFIT_OT_make_classic(bpy.types.Operator):
         return found
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        material = bpy.data.materials.new(NAME)
+        material = bpy.data.materials.new(nodes.classic.NAME)
         # It shows what it emits; as a lamp for the rest of the scene it would only add noise.
         material.cycles.emission_sampling = "NONE"
-        tree = empty_shader_tree(material)
+        tree = nodes.tree.empty_shader_tree(material)
         node = tree.nodes.new("ShaderNodeGroup")
-        node.node_tree = classic_group()
-        node.name = node.label = NAME
+        node.node_tree = nodes.classic.classic_group()
+        node.name = node.label = nodes.classic.NAME
         node.width = 240.0
         output = tree.nodes.new("ShaderNodeOutputMaterial")
         output.location = (300.0, 0.0)
@@ -78,7 +77,7 @@ scene, as they are now"""
 def classic_nodes(material: bpy.types.Material | None) -> list[bpy.types.Node]:
     """The instances of the group in a material."""
     tree = material and material.node_tree
-    return [node for node in tree.nodes if is_classic(node)] if tree else []
+    return [node for node in tree.nodes if nodes.classic.is_classic(node)] if tree else []
 
 
 def suns_of(context: bpy.types.Context) -> list[Light]:
@@ -124,16 +123,16 @@ def _world_radiance(world: bpy.types.World | None) -> Vector | None:
 
 
 def _take_lights(
-    reporter: bpy.types.Operator, context: bpy.types.Context, nodes: list[bpy.types.Node]
+    reporter: bpy.types.Operator, context: bpy.types.Context, found: list[bpy.types.Node]
 ) -> None:
     suns, ambient = suns_of(context), _world_radiance(context.scene.world)
-    for node in nodes:
-        for index in range(LIGHTS):
+    for node in found:
+        for index in range(nodes.classic.LIGHTS):
             _set_light(node, index, suns[index] if index < len(suns) else None)
         if ambient is not None:
             node.inputs["Ambient Light"].default_value = (*ambient, 1.0)
-    if len(suns) > LIGHTS:
-        text = f"The {LIGHTS} brightest of {len(suns)} suns were taken"
+    if len(suns) > nodes.classic.LIGHTS:
+        text = f"The {nodes.classic.LIGHTS} brightest of {len(suns)} suns were taken"
         reporter.report({"WARNING"}, text)
     if ambient is None:
         text = "Ambient Light is left as it was: the world is not of one colour"
@@ -144,7 +143,7 @@ def _set_light(node: bpy.types.Node, index: int, light: Light | None) -> None:
     """Fills a light's inputs; without a light it is black, and its direction stays."""
 
     def put(what: str, value: Any) -> None:
-        node.inputs[light_socket(index, what)].default_value = value
+        node.inputs[nodes.classic.light_socket(index, what)].default_value = value
 
     if light:
         put("Direction", light.direction)

@@ -7,10 +7,9 @@ from typing import ClassVar
 import bpy
 from bpy.props import StringProperty
 
-from .. import native
+from .. import native, nodes
 from ..jobs import Outcome
 from ..locks import lock_of
-from ..nodes.material import fill_material
 from ..records import active_material, record_of, source_file
 from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB
 from .polls import poll_changeable, poll_measured
@@ -68,7 +67,7 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
         if not found:
             return "The material was removed while its fit was under way."
-        fill_material(found[0], done[0].record, **self.material_options())
+        nodes.material.fill_material(found[0], done[0].record, **self.material_options())
         draw_spheres(found[0])
         return ""
 

@@ -14,9 +14,8 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper
 
-from .. import native
+from .. import native, nodes
 from ..jobs import Outcome
-from ..nodes.material import build_material, discard
 from ..picking import slot_under
 from ..properties import draw_fit_options
 from ..targets import (
@@ -183,7 +182,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
         try:
             for outcome in done:
                 yield
-                material = build_material(outcome.record, **options)
+                material = nodes.material.build_material(outcome.record, **options)
                 made.append(material.session_uid)
                 problem = self._target.put(material) if self._target else ""
                 if problem:
@@ -191,7 +190,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
                 # A material without a user would be lost when the file is saved.
                 material.use_fake_user = material.users == 0
         except BaseException:
-            discard(made, groups)
+            nodes.material.discard(made, groups)
             raise
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -5,10 +5,9 @@ from typing import Any, ClassVar
 import bpy
 from bpy.props import EnumProperty
 
-from .. import native
+from .. import native, nodes
 from ..jobs import Batch
 from ..locks import problem_of
-from ..nodes.material import fill_material, shown_by
 from ..parameters import is_edited
 from ..preferred import take_preferred
 from ..properties import KINDS, KindOptions, draw_kind_options
@@ -85,9 +84,11 @@ class LOBEFIT_OT_set_kind(KindOptions, RunsWork, bpy.types.Operator):
         changed = [m for m in bpy.data.materials if m.session_uid in self._ready]
         for material in changed:
             record = self._ready[material.session_uid]
-            if is_edited(material, record_of(material), shown_by(material, record).kind):
+            if is_edited(
+                material, record_of(material), nodes.material.shown_by(material, record).kind
+            ):
                 self._problems.append(f"{material.name}: what was edited in it was replaced")
-            fill_material(material, record, **self.material_options())
+            nodes.material.fill_material(material, record, **self.material_options())
         for problem in self._problems:
             self.report({"WARNING" if changed else "ERROR"}, problem)
         if not changed:

@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-from .. import native
-from ..nodes.material import shown_by
+from .. import native, nodes
 from ..records import KEY, active_material, record_of
 from .import_measured import GLOB_DESCRIPTION
 from .run import RunsWork
@@ -196,7 +195,7 @@ node, and heights for displacement. The file of lights says which images belong 
             found = f"'{self.material}'" if self.material else "none"
             raise InputError(f"Material: expected one made of a measurement, found {found}.")
         record = Record.from_json(material[KEY], material.name)
-        return shown_by(material, record).shown(record)
+        return nodes.material.shown_by(material, record).shown(record)
 
 
 def _images(names: Sequence[str]) -> list[bpy.types.Image]:

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import bpy
 
-from ..nodes.material import fill_material
+from .. import nodes
 from ..parameters import is_edited, reset
 from ..records import COUNT_KEY, KEY, KIND_KEY, active_material, has_bounces, record_of
 from .at_once import ActsAtOnce
@@ -38,7 +38,9 @@ class LOBEFIT_OT_edit_parameters(_EditsMaterial, bpy.types.Operator):
     def act(self, material: bpy.types.Material) -> str:
         import lobefit
 
-        fill_material(material, lobefit.Record.from_json(material[KEY], material.name), "live")
+        nodes.material.fill_material(
+            material, lobefit.Record.from_json(material[KEY], material.name), "live"
+        )
         return ""
 
 
@@ -67,5 +69,7 @@ class LOBEFIT_OT_reset_parameters(_EditsMaterial, bpy.types.Operator):
         if not reset(material, record_of(material), kind):
             # Its nodes are no longer those of the record.
             count = material.get(COUNT_KEY) if kind in ("lobe", "measured") else None
-            fill_material(material, record, kind, count, diffuse_bounces=has_bounces(material))
+            nodes.material.fill_material(
+                material, record, kind, count, diffuse_bounces=has_bounces(material)
+            )
         return ""

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
-from .. import native, pictures
-from ..nodes.material import shown_by
+from .. import native, nodes, pictures
 from ..parameters import edited_shown, is_edited
 from ..records import KEY, active_material, located, record_of
 from .at_once import ActsAtOnce
@@ -48,8 +47,8 @@ def draw_spheres(
     from lobefit.picture import disc
 
     record, measurement = measured(material)
-    shown, caption, missing = shown_by(material, record).shown(record), "", ""
-    if is_edited(material, record_of(material), shown_by(material, record).kind):
+    shown, caption, missing = nodes.material.shown_by(material, record).shown(record), "", ""
+    if is_edited(material, record_of(material), nodes.material.shown_by(material, record).kind):
         edited = edited_shown(material, shown)
         if edited is None and rendered is None:
             missing = "No formula tells the material as it was edited: it is shown as fitted"
@@ -116,7 +115,7 @@ class LOBEFIT_OT_draw_chart(ActsAtOnce, bpy.types.Operator):
         from lobefit import charts
 
         record, measurement = measured(material)
-        choice = shown_by(material, record)
+        choice = nodes.material.shown_by(material, record)
         shown = edited_shown(material, choice.shown(record)) or choice.shown(record)
         missing = "" if measurement else "The measured file is not found: the fitted lobe is drawn"
         if self.chart == "ERROR_MAP":

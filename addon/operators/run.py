@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import bpy
 
+from .. import nodes
 from ..jobs import Batch, Outcome
-from ..nodes.material import choose
 from ..properties import FitOptions
 
 POLL = 0.05  # seconds between two looks at a fit
@@ -201,7 +201,7 @@ class RunsFits(FitOptions, RunsWork):
         return {"FINISHED"}
 
     def _success(self, record: Any) -> str:
-        shown = choose(record, **self.material_options())
+        shown = nodes.material.choose(record, **self.material_options())
         seconds = record.seconds["total"] + sum(entry["seconds"] for entry in record.closures)
         return f"{record.name}: {shown.error(record):.1%} off, fitted in {seconds:.1f} s"
 

@@ -8,8 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 from mathutils import Matrix, Vector
 
-from .. import native
-from ..nodes.tree import empty_shader_tree
+from .. import native, nodes
 from ..records import active_material, record_of
 from .preview import measured
 
@@ -189,7 +188,7 @@ def _picture_material(image: bpy.types.Image) -> bpy.types.Material:
     """Shows the light of a picture as it is, and nothing where there is none in it."""
     material = bpy.data.materials.new(image.name)
     material.cycles.emission_sampling = "NONE"
-    tree = empty_shader_tree(material)
+    tree = nodes.tree.empty_shader_tree(material)
     picture, light, nothing, mix, output = (
         tree.nodes.new(f"ShaderNode{name}")
         for name in ("TexImage", "Emission", "BsdfTransparent", "MixShader", "OutputMaterial")

@@ -39,8 +39,8 @@ OPERATORS = [
     "update_materials",
 ]
 
-# What costs too much to be loaded as Blender starts. Some of it `bpy` has loaded already, or other
-# add-ons have, so it is forgotten first.
+# What costs too much to be loaded as Blender starts, besides what makes nodes. Some of it `bpy` has
+# loaded already, or other add-ons have, so it is forgotten first.
 HEAVY = ["numpy", "lobefit", "tempfile", "subprocess", "tomllib", "hashlib", "multiprocessing"]
 START = """
 import sys
@@ -48,7 +48,7 @@ import bpy
 
 class Refusing:
     def find_spec(self, name, path, target=None):
-        if name.partition(".")[0] in sys.argv[2:]:
+        if name.partition(".")[0] in sys.argv[2:] or name.startswith("started_addon.nodes."):
             raise AssertionError(f"{name} was loaded")
 
 for name in [name for name in sys.modules if name.partition(".")[0] in sys.argv[2:]]:
