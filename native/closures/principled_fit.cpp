@@ -56,6 +56,7 @@ int brightest_tint(const Vector& x) {
 // A view's lights, each amount in a column of its own, padded with black ones that weigh nothing.
 class View {
  public:
+  View() = default;
   // Of the lights one of `every_light`.
   View(const TargetView& view, std::size_t every_light) : n_wo_(view.wo.z()) {
     const std::size_t count = (view.lights.size() + every_light - 1) / every_light;
@@ -90,7 +91,7 @@ class View {
  private:
   static constexpr int column_count = 9;
   using Row = Eigen::Array<double, 1, column_count>;
-  double n_wo_;
+  double n_wo_ = 1;
   Eigen::Array<double, Eigen::Dynamic, column_count> columns_;
 };
 
@@ -108,11 +109,14 @@ std::vector<std::size_t> one_of(std::size_t every, std::size_t count) {
 }
 
 // One of `every_view` views, and of its lights one of `every_light`.
-std::vector<View> views_of(const Target& target, std::size_t every_view, std::size_t every_light) {
-  std::vector<View> views;
-  for (const std::size_t v : one_of(every_view, target.size())) {
-    views.emplace_back(target[v], every_light);
-  }
+std::vector<View> views_of(const Target& target, std::size_t every_view, std::size_t every_light,
+                           int threads) {
+  const std::vector<std::size_t> chosen = one_of(every_view, target.size());
+  std::vector<View> views(chosen.size());
+  parallel_for(static_cast<int>(chosen.size()), threads, [&](int i) {
+    const auto at = static_cast<std::size_t>(i);
+    views[at] = View(target[chosen[at]], every_light);
+  });
   return views;
 }
 
@@ -143,8 +147,8 @@ PrincipledKernelInput kernel_input(const View& view, const Vector& x, double smo
   return in;
 }
 
-// The distance to the target by error_of, up to a factor where views or lights are left out, with
-// |r| made smooth as sqrt(r^2 + e^2) - e, e = smoothing x typical.
+// The distance to the target as error_of tells it, up to a factor where views or lights are left
+// out, with |r| made smooth as sqrt(r^2 + e^2) - e, e = smoothing x typical.
 double smooth_error(const Views& views, const Vector& x, double smoothing) {
   return sum_over_views(views, 0.0, [&](const View& view) {
     return run_principled_error(kernel_input(view, x, smoothing));
@@ -307,16 +311,18 @@ struct Candidate {
 
 }  // namespace
 
-Principled fit_principled(const Target& target, int threads) {
+Principled fit_principled(const Target& target, int requested_threads) {
   if (target.empty()) return {};
-  const std::vector<View> thin = views_of(target, 12, 3), whole = views_of(target, 1, 1);
+  const int threads = thread_count(requested_threads);
+  const std::vector<View> thin = views_of(target, 12, 3, threads),
+                          whole = views_of(target, 1, 1, threads);
   const Views few = thin_out(thin, 1), some = thin_out(whole, 12),
-              half = thin_out(whole, 2, thread_count(threads));
+              half = thin_out(whole, 2, threads), all = thin_out(whole, 1, threads);
   std::vector<Candidate> found;
   for (const Vector& start : starts(few)) found.push_back({start, 0});
   // Follows every candidate and keeps the best few.
   const auto follow = [&](const Views& views, double smoothing, int iterations, std::size_t kept) {
-    parallel_for(static_cast<int>(found.size()), thread_count(threads), [&](int i) {
+    parallel_for(static_cast<int>(found.size()), threads, [&](int i) {
       Candidate& candidate = found[static_cast<std::size_t>(i)];
       candidate.x = descend(views, candidate.x, smoothing, iterations);
       candidate.error = smooth_error(views, candidate.x, 0);
@@ -337,10 +343,7 @@ Principled fit_principled(const Target& target, int threads) {
   result.metallic = best[metallic];
   result.roughness = std::exp(best[log_roughness]);
   result.ior = (1 + best[root]) / (1 - best[root]);
-  result.error = error_of(
-      target,
-      [&](const Vector3& wi, const Vector3& wo) { return evaluate_principled(result, wi, wo); },
-      threads);
+  result.error = smooth_error(all, best, 0);
   return result;
 }
 

@@ -23,30 +23,35 @@ constexpr double least_picture_cosine = 0.1;
 // What is darker is black and what is brighter could make sums infinite; no reflectance comes near.
 constexpr double darkest = 1e-12, brightest = 1e30;
 
+// An angle p between light and viewer among the hats of SumByPhase: between two of them, or at an
+// end.
+struct Phase {
+  std::size_t below;
+  double share;  // of the hat after it
+};
+
 // The sum of an amount over all samples at about one angle p between light and viewer, as a
 // function of p: hats of 5 degrees, constant beyond the first and the last, where pictures hold
 // next to nothing.
 class SumByPhase {
  public:
   static constexpr std::size_t count = 33;
-  void add(double cosine, double amount) {
-    const auto [below, share] = place(cosine);
-    sums_[below] += (1 - share) * amount;
-    sums_[below + 1] += share * amount;
-  }
-  double operator()(double cosine) const {
-    const auto [below, share] = place(cosine);
-    return (1 - share) * sums_[below] + share * sums_[below + 1];
-  }
-
- private:
-  static constexpr double step = 5, first = 5, last = 165;
-  static std::pair<std::size_t, double> place(double cosine) {
+  static Phase place(double cosine) {
     const double phase = degrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
     const double at = (std::clamp(phase, first, last) - first) / step;
     const auto below = std::min(static_cast<std::size_t>(at), count - 2);
     return {below, at - static_cast<double>(below)};
   }
+  void add(const Phase& at, double amount) {
+    sums_[at.below] += (1 - at.share) * amount;
+    sums_[at.below + 1] += at.share * amount;
+  }
+  double operator()(const Phase& at) const {
+    return (1 - at.share) * sums_[at.below] + at.share * sums_[at.below + 1];
+  }
+
+ private:
+  static constexpr double step = 5, first = 5, last = 165;
   std::array<double, count> sums_{};
 };
 
@@ -97,23 +102,29 @@ TargetView sample_view(const Reflectance& f, const Vector3& wo, double share, do
 
 Target sample_target(const Reflectance& f, int threads) {
   Target target(views);
+  std::vector<std::vector<Phase>> phases(views);  // of each light
   parallel_for(views, thread_count(threads), [&](int i) {
     constexpr double golden = 0.6180339887498949;
     const double root = least_root + (1 - least_root) * (i + 0.5) / views;
     const double cosine = root * root;
     const Vector3 wo(std::sqrt(1 - cosine * cosine), 0, cosine);
     const double offset = std::fmod(0.5 + golden * i, 1.0);
-    target[static_cast<std::size_t>(i)] =
-        sample_view(f, wo, picture_share(cosine), std::max(offset, 0.02));
+    const auto at = static_cast<std::size_t>(i);
+    target[at] = sample_view(f, wo, picture_share(cosine), std::max(offset, 0.02));
+    for (const TargetLight& light : target[at].lights) {
+      phases[at].push_back(SumByPhase::place(light.wi.dot(wo)));
+    }
   });
   SumByPhase light, weight;
   double all_light = 0, all_weight = 0;
-  for (const TargetView& view : target) {
+  for (std::size_t v = 0; v < target.size(); ++v) {
+    const TargetView& view = target[v];
     if (view.wo.z() < least_picture_cosine) continue;
-    for (const TargetLight& at : view.lights) {
-      const double cos_phase = at.wi.dot(view.wo), reflected = at.weight * at.reflected.sum();
-      light.add(cos_phase, reflected);
-      weight.add(cos_phase, 3 * at.weight);
+    for (std::size_t i = 0; i < view.lights.size(); ++i) {
+      const TargetLight& at = view.lights[i];
+      const double reflected = at.weight * at.reflected.sum();
+      light.add(phases[v][i], reflected);
+      weight.add(phases[v][i], 3 * at.weight);
       all_light += reflected;
       all_weight += 3 * at.weight;
     }
@@ -121,13 +132,14 @@ Target sample_target(const Reflectance& f, int threads) {
   if (!(all_light > darkest * all_weight)) return {};
   const double mean_light = all_light / SumByPhase::count;
   double error_of_black = 0;
-  for (TargetView& view : target) {
+  for (std::size_t v = 0; v < target.size(); ++v) {
+    TargetView& view = target[v];
     double view_light = 0;
-    for (TargetLight& at : view.lights) {
-      const double cos_phase = at.wi.dot(view.wo);
+    for (std::size_t i = 0; i < view.lights.size(); ++i) {
+      TargetLight& at = view.lights[i];
       // A phase that is all but black weighs as one with a ten-thousandth of the mean light.
-      const double at_phase = std::max(light(cos_phase), 1e-4 * mean_light);
-      at.typical = at_phase / std::max(weight(cos_phase), 1e-30);
+      const double at_phase = std::max(light(phases[v][i]), 1e-4 * mean_light);
+      at.typical = at_phase / std::max(weight(phases[v][i]), 1e-30);
       at.weight /= at_phase * SumByPhase::count;
       view_light += at.weight * at.reflected.sum();
     }

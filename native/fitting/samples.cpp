@@ -36,11 +36,13 @@ double typical_reflectance(const Measurement& measurement, std::size_t stride = 
   for (std::size_t i = 0; i < planes.size(); i += stride) {
     if (!std::isnan(planes[i])) values.push_back(planes[i]);
   }
-  if (values.size() < enough && stride > 1) return typical_reflectance(measurement, 1);
+  const auto look_at_all = [&] { return typical_reflectance(measurement, 1); };
+  if (values.size() < enough && stride > 1) return look_at_all();
   if (values.empty()) return 1;
   const double bright = quantile(values, 0.999), median = quantile(values, 0.5);
   if (median > next_to_nothing * bright) return median;
-  if (stride > 1) return typical_reflectance(measurement, 1);
+  const auto lit = std::count_if(values.begin(), values.end(), [](double f) { return f > 0; });
+  if (lit < static_cast<std::ptrdiff_t>(enough) && stride > 1) return look_at_all();
   double mean = 0;
   for (const double value : values) {
     mean += std::min(value, bright / next_to_nothing) / static_cast<double>(values.size());

@@ -216,8 +216,8 @@ def test_menus(addon, library, no_libraries):
 
 @pytest.fixture
 def child(addon, folder, measured_file):
-    """A library of three tables under way in another Blender."""
-    for index in range(3):
+    """A library of many tables under way in another Blender."""
+    for index in range(8):
         (folder / f"{index}.binary").symlink_to(measured_file)
     module = importlib.import_module(f"{EXTENSION}.child")
     place = folder.parent / "lib.blend"
