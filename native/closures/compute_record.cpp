@@ -61,6 +61,7 @@ AlbedoByViewAngle albedo_by_view_angle(const Measurement& measurement, const Par
 RecordContents compute_record(const MeasurementSource& source, const FitOptions& options,
                               Monitor& monitor) {
   const Clock::time_point start = Clock::now();
+  const Crew crew(thread_count(options.threads));
   RecordContents contents;
   monitor.report("Reading", 0);
   const std::shared_ptr<const Measurement> measurement = open(source, options.threads);

@@ -207,7 +207,7 @@ Samples all_samples(const Measurement& measurement, const FitOptions& options) {
 }
 
 Samples subsample(const Samples& all, std::size_t count, int threads) {
-  std::vector<float> chance(all.size());
+  SampleColumn<float> chance(all.size());
   std::vector<double> sums(all.runs.size());
   parallel_for(static_cast<int>(all.runs.size()), threads, [&](int r) {
     const Samples::Run& run = all.runs[static_cast<std::size_t>(r)];
