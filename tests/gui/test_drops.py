@@ -27,19 +27,6 @@ def files(shared):
     return FileBrowser(shared)
 
 
-@pytest.fixture
-def cube(shared, files):
-    """Where the cube is on the display; there is no measured material yet."""
-    shared.ask(
-        "for m in list(bpy.data.materials):\n"
-        "    if m.name != 'Material': bpy.data.materials.remove(m)\n"
-        "bpy.data.objects['Cube'].material_slots[0].material = bpy.data.materials['Material']\n"
-        "bpy.ops.ed.undo_push()"
-    )
-    x, y = shared.ask(CUBE)
-    return x, HEIGHT - y
-
-
 def settled(window):
     """How things stand when nothing is fitted any more."""
     window.wait_for("bool(bpy.context)")
@@ -56,6 +43,17 @@ def undone(window, place):
 
 
 BEFORE = {"kept": [], "slots": ["Material"]}
+
+
+@pytest.fixture
+def cube(shared, files):
+    """Where the cube is on the display; there is no measured material yet."""
+    # Each test takes its drop back itself: Blender 4.3 comes to an end where a script removes a
+    # material whose icon is being drawn, while undoing ends that first.
+    assert settled(shared) == BEFORE
+    shared.ask("bpy.ops.ed.undo_push()")
+    x, y = shared.ask(CUBE)
+    return x, HEIGHT - y
 
 
 def test_on_an_object(shared, files, cube):
@@ -90,6 +88,7 @@ def test_on_the_material_tab(shared, files, cube):
     shared.drag(files.place("nickel.binary"), (left + width * 0.6, top + height * 0.8))
     assert settled(shared) == {"kept": [], "slots": ["nickel"]}
     shared.shot("drop_on_the_material_tab")
+    assert undone(shared, cube) == BEFORE
 
 
 def test_on_the_shader_editor(shared, files, cube):
