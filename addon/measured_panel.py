@@ -98,7 +98,7 @@ def draw_closeness(layout: Any, context: bpy.types.Context, record: Any, choice:
     error, grazing = choice.error(record), choice.grazing_error(record)
     judgement = next(text for limit, text in _JUDGEMENTS if error <= limit)
     near = "" if grazing is None else f", seen at grazing angles {grazing:.1%}"
-    sentence = f"{kind}{closures}. {judgement}: {error:.1%} of the reflected light is off{near}."
+    sentence = f"{kind}{closures}. {judgement}: {choice.told_error(record)}{near}."
     draw_paragraph(layout, sentence, "INFO", context)
     for sentence in (_energy(choice.albedo(record)), *record.warnings):
         if sentence:

@@ -129,16 +129,23 @@ class Choice(NamedTuple):
         return 0 if self.closures is None else len(self.closures["specular"])
 
     def error(self, record: Any) -> float:
-        """The part of the light that is off, of the live kind that of the lobe it shows."""
-        if self.closures is not None:
+        """The part of the measured light that is off; of a fitted lobe that of the fit."""
+        if self.kind == "measured":
             return self.closures["error"]
         if self.kind == "principled":
             return record.principled["error"]
         return record.error["relative_l1_cosine"]["pooled"] or 0.0
 
+    def told_error(self, record: Any) -> str:
+        """The same in words, and what closures add to that of a fitted lobe."""
+        told = f"{self.error(record):.1%} of the reflected light is off"
+        if self.kind == "lobe":
+            told += f", and {self.closures['error']:.1%} of the fitted lobe's"
+        return told
+
     def grazing_error(self, record: Any) -> float | None:
         """The same of the light seen from beyond 70 degrees from the normal, where it is known."""
-        if self.closures is not None:
+        if self.kind == "measured":
             table = self.closures["by_view"]
             errors = zip(table["view_angle"], table["relative_error"], strict=True)
             found = [error for angle, error in errors if angle >= GRAZING]

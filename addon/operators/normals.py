@@ -170,10 +170,13 @@ node, and heights for displacement. The file of lights says which images belong 
 
     def _job(self) -> Any:
         """The estimate, started. Raises InputError for what it cannot be started with."""
+        import lobefit
         from lobefit import lights, normals
 
         from ..images import linear_light
 
+        if not self.filepath:
+            raise lobefit.InputError("File Path: expected a file of lights, found none.")
         path = bpy.path.abspath(self.filepath)
         lighting = lights.read_lights(path)
         names = [each.image or self.image for each in lighting]

@@ -106,6 +106,7 @@ def test_one_image_of_bytes_by_the_classic_model(addon, lights):
     [
         ({"material": "none such"}, "Material: expected one made of a measurement"),
         ({"surface": "classic-phong", "image": "gone"}, "Image: expected one named 'gone'"),
+        ({"filepath": ""}, "File Path: expected a file of lights, found none"),
         ({"filepath": "/no/such.json"}, "expected a file of lights, found no such file"),
     ],
 )

@@ -85,6 +85,7 @@ def test_panel_of_every_kind(addon, on_a_cube, kind):
     assert bpy.ops.lobefit.set_kind(kind=kind) == {"FINISHED"}
     layout = material_tab()
     assert "of the reflected light is off" in told(layout)
+    assert ("of the fitted lobe's" in told(layout)) == (kind == "lobe")
     assert "default_value" in layout.properties
     assert "edited" not in told(layout)
 
@@ -113,6 +114,15 @@ def test_grazing_error_is_that_of_the_closures(addon, material):
     expected = sum(view["misfit"][first:]) / sum(view["measured"][first:])
     assert live.grazing_error(record) == pytest.approx(expected)
     assert addon.nodes.material.choose(record, "principled").grazing_error(record) is None
+
+
+def test_error_of_a_lobe_is_that_of_the_fit(addon, on_a_cube):
+    """And not of its closures, which only tell how near they are to the lobe."""
+    assert bpy.ops.lobefit.set_kind(kind="lobe") == {"FINISHED"}
+    record, choose = record_of(on_a_cube), addon.nodes.material.choose
+    lobe, live = choose(record, "lobe"), choose(record, "live")
+    assert lobe.error(record) == live.error(record) > lobe.closures["error"]
+    assert lobe.grazing_error(record) == live.grazing_error(record)
 
 
 def test_panel_tells_of_more_light_than_arrives(addon, on_a_cube):

@@ -69,8 +69,29 @@ def test_bad_files_get_one_sentence(tmp_path, capfd, kind):
 @pytest.mark.parametrize("command", ["fit", "preview", "report"])
 def test_a_bad_file_leaves_no_output(tmp_path, capfd, command):
     path = written(tmp_path / "bad.binary", b"")
-    assert str(path) in refuse(capfd, command, path, "-o", tmp_path / "out")
+    output = tmp_path / {"fit": "out.json", "preview": "out.png", "report": "out"}[command]
+    assert str(path) in refuse(capfd, command, path, "-o", output)
     assert os.listdir(tmp_path) == ["bad.binary"]
+
+
+@pytest.mark.parametrize("command", ["fit", "closures", "material"])
+def test_other_files_are_not_written_over(tmp_path, capfd, command):
+    """A record or a Blender file in the place of a measured file would be a slip."""
+    table, other = write_table(tmp_path / "a.binary"), written(tmp_path / "b.binary", b"measured")
+    assert "expected a name that ends in ." in refuse(capfd, command, table, "-o", other)
+    assert other.read_bytes() == b"measured"
+
+
+def test_a_refused_folder_is_not_made(tmp_path, capfd):
+    twice = [write_table(folder(tmp_path / name) / "a.binary") for name in ("one", "two")]
+    assert "expected one file to make it of" in refuse(capfd, "fit", *twice, "-o", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_tolerance_that_nothing_heeds_is_refused(tmp_path, capfd):
+    arguments = ["material", write_table(tmp_path / "a.binary"), "--kind", "measured"]
+    told = refuse(capfd, *arguments, "--tolerance", 0.1, "-o", tmp_path / "a.blend")
+    assert "--tolerance: expected the kind auto, found measured." in told
 
 
 def test_a_folder_is_no_measurement(tmp_path, capfd):
@@ -157,6 +178,16 @@ def test_samples_say_what_they_are(tmp_path, capfd):
     facts = json.loads(capfd.readouterr().out)
     assert facts["name"] == "nickel (from Low et al.'s ABC fit)"
     assert facts["bytes"] == BYTES
+
+
+def test_a_sample_takes_no_other_file_s_place(tmp_path, capfd):
+    other = written(tmp_path / "nickel.binary", b"measured")
+    told = refuse(capfd, "sample", tmp_path, "chrome", "nickel")
+    assert "expected a free name for a sample, found another file" in told
+    assert other.read_bytes() == b"measured" and os.listdir(tmp_path) == ["nickel.binary"]
+    other.unlink()
+    for _ in range(2):  # it takes its own place
+        assert main(["sample", str(tmp_path), "nickel"]) == 0
 
 
 def test_another_file_does_not_inherit_the_name_of_a_sample(tmp_path, table, capfd):

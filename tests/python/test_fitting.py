@@ -108,6 +108,11 @@ def test_unknown_options_are_named(table, option, value):
         lobefit.fit(table, **{option: value})
 
 
+def test_another_option_is_named(table):
+    with pytest.raises(TypeError, match=r"expected options among channels, .* found 'nrm'"):
+        lobefit.fit(table, nrm="l1")
+
+
 def test_the_record_tells_where_the_error_stands(recovered):
     parts = recovered.error_by_angle["half_difference"]
     # Five digits of each of the 225 parts are kept.

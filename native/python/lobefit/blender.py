@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,14 @@ _MEMORY = 1 << 30  # bytes; less is not enough for its exporters
 _POLL = 0.1  # seconds between two looks at work under way
 
 
+class Shown(NamedTuple):
+    """What Cycles shows of a record, and how far it is off, in a few words each and as a number."""
+
+    what: str
+    off: str
+    error: float  # the part of the measured light
+
+
 def need_blender() -> None:
     """Raises InputError, with what to install, where Blender's Python module is missing.
 
@@ -49,8 +57,8 @@ def need_blender() -> None:
     for module in _MODULES:
         if importlib.util.find_spec(module) is None:
             raise InputError(
-                f"expected the Python module {module} to make a material, found none; install it "
-                "with: pip install bpy."
+                f"expected the Python module {module}, found none; install it with: pip install "
+                "bpy."
             )
     memory.need(_MEMORY)
 
@@ -61,11 +69,11 @@ def write_blend(
     kind: str = "live",
     count: int | None = None,
     tolerance: float = TOLERANCE,
-) -> tuple[str, float]:
+) -> Shown:
     """Writes a Blender file with the material of a record on a sphere under two lights.
 
     `kind`, `count` and `tolerance` are those of `lobefit_addon.build_material`. Returns what Cycles
-    shows, in a few words, and the part of the light that is off.
+    shows.
     """
     _two_lights_scene(record, 512, kind, count=count, tolerance=tolerance)
     _save(path)
@@ -118,13 +126,14 @@ def write_library(
 
 def shown(
     record: Record, kind: str, count: int | None = None, tolerance: float = TOLERANCE
-) -> tuple[str, float]:
-    """What Cycles shows of a record, in a few words, and the part of the light that is off."""
+) -> Shown:
+    """What is built of a record with these arguments of `lobefit_addon.build_material`."""
     from lobefit_addon.nodes.material import choose
 
     choice = choose(record, kind, count, tolerance)
-    closures = f", {choice.count} specular closures" if choice.closures else ""
-    return choice.kind + closures, choice.error(record)
+    plural = "" if choice.count == 1 else "s"
+    closures = f", {choice.count} specular closure{plural}" if choice.closures else ""
+    return Shown(choice.kind + closures, choice.told_error(record), choice.error(record))
 
 
 def render(record: Record, size: int, kind: str = "live") -> NDArray[np.float32]:
@@ -353,8 +362,8 @@ def _asset(
     from lobefit_addon.nodes.material import choose
 
     material = build_material(record, kind, asset.name or record.name, count)
-    what, error = shown(record, kind, count)
-    told = [f"{what}, {error:.1%} of the reflected light is off"]
+    looks = shown(record, kind, count)
+    told = [f"{looks.what}, {looks.off}"]
     told += [f"Measured in {record.source['path']}"] if record.source["path"] else []
     told += [f"Source: {asset.source}"] if asset.source else []
     mark_asset(material, asset, catalogues.identifier(asset.catalogue), ". ".join(told))

@@ -244,7 +244,7 @@ def _add_json(command: argparse.ArgumentParser) -> None:
 
 def _add_sample(commands: Any) -> None:
     command = _add(commands, _sample, "write sample measurements made from published figures")
-    command.add_argument("folder", metavar="DIR")
+    command.add_argument("folder", metavar="DIR", help="also of samples.csv, which names them")
     command.add_argument("names", metavar="NAME", nargs="*", help="all when none is given")
     _add_json(command)
 
@@ -257,14 +257,24 @@ def _add_info(commands: Any) -> None:
 
 def _add_fit(commands: Any) -> None:
     command = _add(commands, _fit, "fit a model to measured files")
-    command.add_argument("files", metavar="FILE", nargs="+", help="measured files, or folders")
+    command.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="measured files, or folders: all *.binary and *.bsdf in them, not below",
+    )
     _add_fit_options(command, model="interpolated", norm="l1")
     _add_record_output(command)
 
 
 def _add_closures(commands: Any) -> None:
     command = _add(commands, _closures, "find the few Cycles closures that come nearest")
-    command.add_argument("files", metavar="FILE|RECORD.json", nargs="+", help="or folders")
+    command.add_argument(
+        "files",
+        metavar="FILE|RECORD.json",
+        nargs="+",
+        help="or folders: all *.binary, *.bsdf and *.json in them, not below",
+    )
     command.add_argument("--target", choices=TARGETS, default="measured", help=_DEFAULT)
     _add_closure_options(command)
     _add_fit_options(command, model="interpolated", norm=VISUAL_NORM)
@@ -336,17 +346,42 @@ def _add_fit_options(command: argparse.ArgumentParser, model: str, norm: str) ->
     group = command.add_argument_group("fit of a measured file")
     add = partial(group.add_argument, action=_FitOption)
     add("--model", choices=(*MODELS, "all"), default=model, help=_DEFAULT)
-    add("--no-fresnel", dest="fresnel", nargs=0, const=False, default=True)
-    add("--schedule", choices=SCHEDULES, default="polish", help=_DEFAULT)
-    add("--norm", choices=NORMS, default=norm, help=_DEFAULT)
+    add(
+        "--no-fresnel",
+        dest="fresnel",
+        nargs=0,
+        const=False,
+        default=True,
+        help="leave out the Fresnel factor of the specular part",
+    )
+    add(
+        "--schedule",
+        choices=SCHEDULES,
+        default="polish",
+        help="polish: all parameters from many starts, at last on all bins; subsample: without "
+        "that end; joint: on all bins from one start; stages: from there the paper's three; "
+        + _DEFAULT,
+    )
+    add(
+        "--norm",
+        choices=NORMS,
+        default=norm,
+        help="of the misfit: l1 is the paper's, cosine-l1 weighs by both cosines as pictures do, "
+        "l2, and log-l2 of the logarithms; " + _DEFAULT,
+    )
     add(
         "--max-angle",
         type=_within(float, 1, 90, "degrees"),
         default=90.0,
         metavar="DEG",
-        help="leave out beyond; " + _DEFAULT,
+        help="leave out light and views beyond, 1 to 90; " + _DEFAULT,
     )
-    add("--channels", choices=("shared", "separate"), default="shared", help=_DEFAULT)
+    add(
+        "--channels",
+        choices=("shared", "separate"),
+        default="shared",
+        help="one exponent for red, green and blue, or one each; " + _DEFAULT,
+    )
     group.add_argument(
         "--threads",
         type=_within(int, 0, 1024, "a number"),
@@ -446,7 +481,9 @@ def _add_export(commands: Any) -> None:
 
 def _add_simplify(commands: Any) -> None:
     command = _add(
-        commands, _simplify, "leave out of materials what the scene of a file does not need"
+        commands,
+        _simplify,
+        "leave out of materials what the scene of a file does not need (needs bpy)",
     )
     command.add_argument("file", metavar="FILE.blend")
     command.add_argument(
@@ -734,12 +771,15 @@ def _write_records(
     """Writes the record of every file of a command line, and tells of it."""
     output, fitted = Path(options.output), _fit_options(options)
     one = len(options.files) == 1 and not Path(options.files[0]).is_dir()
+    if one:
+        _need_suffix(output, RECORD_SUFFIX)
     paths = spread(options.files, suffixes)
     _refuse_idle_options(options, paths)
     if one:
         tasks = [Task(paths[0], output, closures, fitted)]
     else:
-        tasks = tasks_in(make_folder(output), paths, closures, fitted)
+        tasks = tasks_in(output, paths, closures, fitted)
+        make_folder(output)
 
     def show(task: Task, record: Record) -> None:
         if options.json:
@@ -779,6 +819,12 @@ def _run(
 def _fit_options(options: argparse.Namespace) -> dict[str, Any]:
     names = ("model", "fresnel", "schedule", "norm", "max_angle", "channels", "threads")
     return {name: getattr(options, name) for name in (*names, "uncertainty")}
+
+
+def _need_suffix(place: Path, suffix: str) -> None:
+    """Raises InputError for another file name: that file would be written over."""
+    if place.suffix.lower() != suffix and not place.is_dir():
+        raise InputError(f"{place}: expected a name that ends in {suffix}.")
 
 
 def _refuse_idle_options(options: argparse.Namespace, paths: Sequence[Path]) -> None:
@@ -877,22 +923,23 @@ def _render(options: argparse.Namespace) -> int:
 def _material(options: argparse.Namespace) -> int:
     blender.need_blender()
     _refuse_idle_options(options, [Path(options.file)])
-    place_to_write(options.output)
+    if options.tolerance is not None and options.kind != "auto":
+        raise InputError(f"--tolerance: expected the kind auto, found {options.kind}.")
+    _need_suffix(place_to_write(options.output), ".blend")
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     requests = closures_for(options.kind, options.closures, tolerance, options.cap_albedo)
     record = _record(Path(options.file), options, requests)
     count = options.closures if options.kind in TARGETS else None
-    shown, error = blender.write_blend(options.output, record, options.kind, count, tolerance)
-    print(f"{options.output}: {record.name}, {shown}, {error:.1%} of the reflected light is off")
-    if options.kind == "auto" and error > tolerance:
+    shown = blender.write_blend(options.output, record, options.kind, count, tolerance)
+    print(f"{options.output}: {record.name}, {shown.what}, {shown.off}")
+    if options.kind == "auto" and shown.error > tolerance:
         print(f"   none keeps to {tolerance:g}: this is the nearest")
     return DONE
 
 
 def _library(options: argparse.Namespace) -> int:
     blender.need_blender()
-    if place_to_write(options.output).suffix.lower() != ".blend":
-        raise InputError(f"{options.output}: expected a name that ends in .blend.")
+    _need_suffix(place_to_write(options.output), ".blend")
     items = items_of(options.files, records_folder(options.output))
     _refuse_idle_options(options, [item.file for item in items])
     requests = closures_for(options.kind, options.closures, cap_albedo=options.cap_albedo)
@@ -905,13 +952,12 @@ def _library(options: argparse.Namespace) -> int:
 
     def show(task: Task, record: Record) -> None:
         records[task.place] = record
-        what, error = blender.shown(record, options.kind, count)
+        shown = blender.shown(record, options.kind, count)
         if options.json:
-            told = {"file": str(task.source), "name": record.name, "shown": what, "error": error}
-            print(json.dumps(told), flush=True)
+            told = {"file": str(task.source), "name": record.name}
+            print(json.dumps(told | {"shown": shown.what, "error": shown.error}), flush=True)
         else:
-            off = f"{error:.1%} of the reflected light is off"
-            print(f"{task.source}: {record.name}, {what}, {off}")
+            print(f"{task.source}: {record.name}, {shown.what}, {shown.off}")
 
     bar = progress_lines if options.json else progress_bar
     try:
@@ -1026,9 +1072,9 @@ def _normals(options: argparse.Namespace) -> int:
     for place in places:
         images.place_for(place)
     names = [Path(path).name for path in options.images]
+    pictures = normals.read_pictures(options.images, options.mask, options.linear)
     lighting = in_order(read_lights(options.lights), names, options.lights)
     source = _shown_material(options)
-    pictures = normals.read_pictures(options.images, options.mask, options.linear)
     if options.saturation:
         pictures = dataclasses.replace(pictures, saturation=options.saturation)
     began = time.perf_counter()

@@ -21,6 +21,10 @@ MOST_CLOSURES = 3
 # Up to which part of the light that is off the kind `auto` takes a material, if not told.
 TOLERANCE = 0.05
 
+# What a job takes beside the model.
+_OPTIONS = frozenset(
+    ("fresnel", "schedule", "norm", "max_angle", "channels", "uncertainty", "threads")
+)
 _MEMORY = 1 << 28  # bytes that a job has room in
 _POLL = 0.05  # seconds between two looks at a job that is waited for
 _SLICE = 0.01  # seconds to spend on the origin where there is no time to wait
@@ -102,6 +106,9 @@ class Job:
         closures: Sequence[Closures] = (),
         **options: Any,
     ) -> None:
+        if unknown := sorted(options.keys() - _OPTIONS):
+            expected = ", ".join(sorted(_OPTIONS))
+            raise TypeError(f"expected options among {expected}, found '{unknown[0]}'")
         memory.need(_MEMORY)
         self._options = options
         self._closures = list(closures)

@@ -108,15 +108,20 @@ def is_unchanged(source: Mapping[str, Any]) -> bool:
 
 
 def write_samples(folder: str | os.PathLike[str], names: list[str]) -> list[Path]:
-    """Writes samples in MERL layout and the list that says what they are; returns their paths."""
+    """Writes samples in MERL layout and the list that says what they are; returns their paths.
+
+    Raises InputError where another file than a sample has the name of one.
+    """
     place = make_folder(folder)
-    paths = []
-    for name in names:
-        paths.append(place / f"{name}.binary")
-        with written_aside(paths[-1]) as aside:
+    paths = {name: place / f"{name}.binary" for name in names}
+    for name, path in paths.items():
+        if path.exists() and origin_of(path).name != sample_title(name):
+            raise InputError(f"{path}: expected a free name for a sample, found another file.")
+    for name, path in paths.items():
+        with written_aside(path) as aside:
             _native.sample(name).write(str(aside))
-    _write_list(place, paths)
-    return paths
+    _write_list(place, list(paths.values()))
+    return list(paths.values())
 
 
 def sample_title(name: str) -> str:
