@@ -190,6 +190,20 @@ def test_a_sample_takes_no_other_file_s_place(tmp_path, capfd):
         assert main(["sample", str(tmp_path), "nickel"]) == 0
 
 
+def test_a_sample_is_listed_before_it_is_there(tmp_path, monkeypatch):
+    """A run that is killed between the two could not be made again otherwise."""
+    replace = os.replace
+
+    def killed(source, target):
+        if str(target).endswith(".binary"):
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", killed)
+    assert main(["sample", str(tmp_path), "nickel"]) == 130
+    assert "nickel.binary" in (tmp_path / "samples.csv").read_text()
+
+
 def test_another_file_does_not_inherit_the_name_of_a_sample(tmp_path, table, capfd):
     assert main(["sample", str(tmp_path), "nickel"]) == 0
     (tmp_path / "nickel.binary").write_bytes(table.read_bytes())

@@ -120,7 +120,8 @@ def write_samples(folder: str | os.PathLike[str], names: list[str]) -> list[Path
     for name, path in paths.items():
         with written_aside(path) as aside:
             _native.sample(name).write(str(aside))
-    _write_list(place, list(paths.values()))
+            # Before it has its name, so that a run that was killed can be made again.
+            _add_to_list(place, name, origin_of(aside).sha256 or "")
     return list(paths.values())
 
 
@@ -129,14 +130,11 @@ def sample_title(name: str) -> str:
     return f"{name} (from Low et al.'s ABC fit)"
 
 
-def _write_list(folder: Path, paths: list[Path]) -> None:
-    """Adds the samples to the folder's list; those written earlier stay in it."""
+def _add_to_list(folder: Path, name: str, digest: str) -> None:
+    """Adds a sample to the folder's list; those written earlier stay in it."""
     with alone_in(folder):
-        rows = _listed(folder)
-        for path in paths:
-            digest = origin_of(path).sha256 or ""
-            values = (digest, path.name, sample_title(path.stem), _PAPER)
-            rows[digest] = dict(zip(_COLUMNS, values, strict=True))
+        values = (digest, f"{name}.binary", sample_title(name), _PAPER)
+        rows = _listed(folder) | {digest: dict(zip(_COLUMNS, values, strict=True))}
         text = io.StringIO()
         writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n", extrasaction="ignore")
         writer.writeheader()
