@@ -47,8 +47,9 @@ def draw_spheres(
     from lobefit.picture import disc
 
     record, measurement = measured(material)
-    shown, caption, missing = nodes.material.shown_by(material, record).shown(record), "", ""
-    if is_edited(material, record_of(material), nodes.material.shown_by(material, record).kind):
+    choice = nodes.material.shown_by(material, record)
+    shown, caption, missing = choice.shown(record), "", ""
+    if is_edited(material, record_of(material), choice.kind):
         edited = edited_shown(material, shown)
         if edited is None and rendered is None:
             missing = "No formula tells the material as it was edited: it is shown as fitted"
