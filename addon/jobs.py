@@ -1,8 +1,26 @@
-"""Fits of files or records one after another, each a C++ job; none waits for long or needs bpy."""
+"""Work that an operator waits for: C++ jobs of their own threads. Nothing here needs bpy."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
+
+
+class Work(Protocol):
+    """What is done bit by bit: fits, or looking at a scene."""
+
+    @property
+    def progress(self) -> float:
+        """The share that is done, from 0 to 1."""
+
+    @property
+    def text(self) -> str:
+        """What is being done."""
+
+    def advance(self, seconds: float) -> bool:
+        """Goes on for about `seconds` or one indivisible bit; says whether all is done."""
+
+    def stop(self) -> None:
+        """Ends what runs in threads of its own."""
 
 
 class Outcome(NamedTuple):
@@ -14,7 +32,7 @@ class Outcome(NamedTuple):
 
 
 class Batch:
-    """The files to fit, or records to add closures to, and what became of those already done."""
+    """Files to fit, or records to add closures to, one after another, and what became of them."""
 
     def __init__(self, sources: Sequence[Any], options: dict[str, Any]) -> None:
         self.outcomes: list[Outcome] = []
@@ -69,3 +87,36 @@ class Batch:
     def _name(self) -> str:
         source = self._sources[len(self.outcomes)]
         return source if isinstance(source, str) else source.name
+
+
+class Estimate:
+    """Normals from shading under way; `problem` says why there are none."""
+
+    def __init__(self, job: Any) -> None:
+        self.surface: Any = None
+        self.problem = ""
+        self._job = job
+
+    @property
+    def progress(self) -> float:
+        """The share that is done, from 0 to 1."""
+        return self._job.progress
+
+    @property
+    def text(self) -> str:
+        """What is being done."""
+        return f"Normals from shading: {self._job.stage}"
+
+    def advance(self, seconds: float) -> bool:
+        """Waits at most `seconds` for the end; says whether it is reached."""
+        if not self._job.wait(seconds):
+            return False
+        try:
+            self.surface = self._job.surface()
+        except MemoryError:
+            self.problem = "Expected enough memory, found too little."
+        return True
+
+    def stop(self) -> None:
+        """Ends the job; its threads are gone when it is."""
+        self._job.cancel()

@@ -25,10 +25,8 @@ from .operators.run import current
 from .operators.source import LOBEFIT_OT_relink
 from .operators.two_lights import LOBEFIT_OT_two_lights
 from .operators.update import LOBEFIT_OT_update_materials
-from .parameters import is_edited, parameter_nodes
 from .properties import KINDS, MODELS, draw_kind_options, draw_model_options, last_options
 from .records import KIND_KEY, active_material, damage_of, entries_of, record_of, source_file
-from .versions import is_newer, is_outdated
 
 if TYPE_CHECKING:
     from .nodes.material import Choice
@@ -107,7 +105,7 @@ def draw_closeness(layout: Any, context: bpy.types.Context, record: Any, choice:
 
 def _problem_of_record(material: bpy.types.Material) -> str:
     """Why nothing can be told of the material; empty for a record that is understood."""
-    if is_newer(material):
+    if nodes.versions.is_newer(material):
         return "A later version of Lobefit made this material: it is left as it is."
     return damage_of(material) if not native.problem() else ""
 
@@ -120,7 +118,7 @@ def _draw_origin(layout: Any, context: bpy.types.Context, material: bpy.types.Ma
         draw_paragraph(layout, sentence, "LINKED", context)
     elif reason:
         draw_paragraph(layout, f"It cannot be changed: {reason}.", "LINKED", context)
-    if is_outdated(material):
+    if nodes.versions.is_outdated(material):
         where = "; update it there" if linked else ""
         sentence = f"Made by an older version of Lobefit{where}. It renders as it did."
         draw_paragraph(layout, sentence, "FILE_REFRESH", context)
@@ -171,7 +169,7 @@ def _draw_error(
     choice: "Choice",
 ) -> None:
     draw_closeness(layout, context, record, choice)
-    if is_edited(material, vars(record), choice.kind):
+    if nodes.parameters.is_edited(material, vars(record), choice.kind):
         sentence = "Its parameters were edited: this is told of the fit, Preview tells it anew."
         draw_paragraph(layout, sentence, "GREASEPENCIL", context)
 
@@ -212,7 +210,7 @@ def _draw_parameters(
     layout: Any, context: bpy.types.Context, material: bpy.types.Material, record: Any
 ) -> None:
     kind = material.get(KIND_KEY, "live")
-    found = parameter_nodes(material, kind)
+    found = nodes.parameters.parameter_nodes(material, kind)
     column = _split_column(layout)
     for node in found:
         for socket in node.inputs if kind != "principled" else _first(node):

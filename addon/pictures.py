@@ -6,7 +6,6 @@ They are there as long as Blender runs, and nothing of them is saved.
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import bpy
-import bpy.utils.previews
 
 from .records import COUNT_KEY, KEY, KIND_KEY
 
@@ -15,7 +14,9 @@ if TYPE_CHECKING:  # NumPy is loaded when it is used: Blender starts as soon as 
 
 IMAGE = "Lobefit Preview"
 
-_icons: Any = None  # by the session_uid of a material and the title of the picture
+_icons: Any = (
+    None  # by the session_uid of a material and the title of the picture; None before the first
+)
 _kept: dict[tuple[int, str], "Drawn"] = {}  # by the same, but for the title
 
 
@@ -40,8 +41,13 @@ def keep(
 
     `place` names the part of the panel that shows them.
     """
+    import bpy.utils.previews
+
     from .images import for_blender
 
+    global _icons
+    if _icons is None:
+        _icons = bpy.utils.previews.new()
     for title, picture in pictures.items():
         key = _key(material, place, title)
         icon = _icons[key] if key in _icons else _icons.new(key)
@@ -90,13 +96,12 @@ def stamp(material: bpy.types.Material) -> int:
     return hash((*told, links, *values))
 
 
-def register() -> None:
-    global _icons
-    _icons = bpy.utils.previews.new()
-
-
 def unregister() -> None:
-    bpy.utils.previews.remove(_icons)
+    """Forgets all of them."""
+    global _icons
+    if _icons is not None:
+        bpy.utils.previews.remove(_icons)
+    _icons = None
     _kept.clear()
 
 

@@ -7,7 +7,18 @@ start does not wait for what no material may need.
 import importlib
 from types import ModuleType
 
-_MODULES = ("baked", "classic", "live", "live_energy", "material", "principled", "tree")
+_MODULES = (
+    "baked",
+    "classic",
+    "live",
+    "live_energy",
+    "material",
+    "parameters",
+    "principled",
+    "scene_lights",
+    "tree",
+    "versions",
+)
 
 
 def __getattr__(name: str) -> ModuleType:

@@ -65,7 +65,6 @@ _ENTRIES = (
 
 
 def register() -> None:
-    pictures.register()
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     for menu, entry in _ENTRIES:

@@ -1,22 +1,11 @@
-"""Classic materials, and the lights that they are told."""
+"""Classic materials: making one, and telling it the lights of the scene."""
 
-import math
-import operator
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import bpy
-from mathutils import Vector
 
 from .. import nodes
 from ..records import active_material
-
-
-class Light(NamedTuple):
-    """A light as the group takes it: the direction toward it, i_d and i_s (linear RGB)."""
-
-    direction: Vector
-    diffuse: Vector
-    specular: Vector
 
 
 class LOBEFIT_OT_make_classic(bpy.types.Operator):
@@ -46,8 +35,7 @@ class LOBEFIT_OT_make_classic(bpy.types.Operator):
         output.location = (300.0, 0.0)
         tree.links.new(node.outputs["Emission"], output.inputs["Surface"])
         context.active_object.active_material = material
-        if suns_of(context):
-            _take_lights(self, context, [node])
+        _take_lights(self, context, [node])
         return {"FINISHED"}
 
 
@@ -67,10 +55,9 @@ scene, as they are now"""
         return found
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if not suns_of(context):
+        if not _take_lights(self, context, classic_nodes(active_material(context))):
             self.report({"ERROR"}, "Expected a sun in the scene, found none.")
             return {"CANCELLED"}
-        _take_lights(self, context, classic_nodes(active_material(context)))
         return {"FINISHED"}
 
 
@@ -80,72 +67,12 @@ def classic_nodes(material: bpy.types.Material | None) -> list[bpy.types.Node]:
     return [node for node in tree.nodes if nodes.classic.is_classic(node)] if tree else []
 
 
-def suns_of(context: bpy.types.Context) -> list[Light]:
-    """The suns that are rendered, the brightest first."""
-    suns = [
-        _light(item)
-        for item in context.view_layer.objects
-        if item.type == "LIGHT" and item.data.type == "SUN" and not item.hide_render
-    ]
-    # Sorting is stable: of two that are equally bright, the first of the scene comes first.
-    return sorted(suns, key=lambda sun: -max(*sun.diffuse, *sun.specular))
-
-
-def _light(sun: bpy.types.Object) -> Light:
-    """Such that the diffuse term shows what Cycles' diffuse closure shows of the sun."""
-    data = sun.data
-    colour = Vector(data.color)
-    # Lamps have an exposure and a temperature since Blender 4.5.
-    if getattr(data, "use_temperature", False):
-        colour = Vector(map(operator.mul, colour, data.temperature_color))
-    radiance = colour * (data.energy * 2 ** getattr(data, "exposure", 0.0) / math.pi)
-    direction = sun.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0))
-    return Light(
-        direction.normalized(), radiance * data.diffuse_factor, radiance * data.specular_factor
-    )
-
-
-def _world_radiance(world: bpy.types.World | None) -> Vector | None:
-    """What comes from everywhere; None where that differs from direction to direction."""
-    if world is None:
-        return Vector()
-    # Since Blender 5.0 every world has nodes, and asking whether it uses them is deprecated.
-    if bpy.app.version < (5, 0) and not world.use_nodes:
-        return Vector(world.color)
-    output = world.node_tree.get_output_node("CYCLES")
-    if output is None or not output.inputs["Surface"].is_linked:
-        return Vector()
-    node = output.inputs["Surface"].links[0].from_node
-    if node.type != "BACKGROUND" or any(socket.is_linked for socket in node.inputs):
-        return None
-    colour, strength = (node.inputs[name].default_value for name in ("Color", "Strength"))
-    return Vector(colour[:3]) * strength
-
-
 def _take_lights(
     reporter: bpy.types.Operator, context: bpy.types.Context, found: list[bpy.types.Node]
-) -> None:
-    suns, ambient = suns_of(context), _world_radiance(context.scene.world)
-    for node in found:
-        for index in range(nodes.classic.LIGHTS):
-            _set_light(node, index, suns[index] if index < len(suns) else None)
-        if ambient is not None:
-            node.inputs["Ambient Light"].default_value = (*ambient, 1.0)
-    if len(suns) > nodes.classic.LIGHTS:
-        text = f"The {nodes.classic.LIGHTS} brightest of {len(suns)} suns were taken"
-        reporter.report({"WARNING"}, text)
-    if ambient is None:
-        text = "Ambient Light is left as it was: the world is not of one colour"
-        reporter.report({"WARNING"}, text)
-
-
-def _set_light(node: bpy.types.Node, index: int, light: Light | None) -> None:
-    """Fills a light's inputs; without a light it is black, and its direction stays."""
-
-    def put(what: str, value: Any) -> None:
-        node.inputs[nodes.classic.light_socket(index, what)].default_value = value
-
-    if light:
-        put("Direction", light.direction)
-    put("Diffuse", (*(light.diffuse if light else (0.0,) * 3), 1.0))
-    put("Specular", (*(light.specular if light else (0.0,) * 3), 1.0))
+) -> bool:
+    """Tells the groups the lights and reports which were left out; False where there is no sun."""
+    suns = nodes.scene_lights.suns_of(context)
+    if suns:
+        for warning in nodes.scene_lights.take_lights(found, suns, context.scene.world):
+            reporter.report({"WARNING"}, warning)
+    return bool(suns)

@@ -2,19 +2,21 @@
 
 from collections.abc import Generator
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import bpy
 from bpy.props import StringProperty
 
 from .. import native, nodes
-from ..jobs import Outcome
 from ..locks import lock_of
 from ..records import active_material, record_of, source_file
 from .import_measured import GLOB_DESCRIPTION, MEASURED_GLOB
 from .polls import poll_changeable, poll_measured
 from .preview import draw_spheres
 from .run import RunsFits, current
+
+if TYPE_CHECKING:  # It is loaded when it is used: Blender starts as soon as before.
+    from ..jobs import Outcome
 
 
 class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
@@ -62,7 +64,9 @@ class LOBEFIT_OT_fit(RunsFits, bpy.types.Operator):
         self._material_uid = material.session_uid
         return self.fit(context, [path])
 
-    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> Generator[None, None, str]:
+    def apply(
+        self, context: bpy.types.Context, done: list["Outcome"]
+    ) -> Generator[None, None, str]:
         yield
         found = [m for m in bpy.data.materials if m.session_uid == self._material_uid]
         if not found:

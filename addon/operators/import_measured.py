@@ -2,7 +2,7 @@
 
 from collections.abc import Generator, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import (
@@ -15,8 +15,6 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native, nodes
-from ..jobs import Outcome
-from ..picking import slot_under
 from ..properties import draw_fit_options
 from ..targets import (
     SlotTarget,
@@ -26,6 +24,9 @@ from ..targets import (
     takes_material,
 )
 from .run import RunsFits
+
+if TYPE_CHECKING:  # It is loaded when it is used: Blender starts as soon as before.
+    from ..jobs import Outcome
 
 MEASURED_SUFFIXES = (".binary", ".bsdf")
 MEASURED_GLOB = ";".join(f"*{suffix}" for suffix in MEASURED_SUFFIXES)
@@ -119,6 +120,8 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
         dropped = bool(self.directory)
         match context.area.type if context.area else "":
             case "VIEW_3D" if dropped:
+                from ..picking import slot_under
+
                 region = context.region
                 place = event.mouse_x - region.x, event.mouse_y - region.y
                 self._aim_at(slot_under(context, place) if region.type == "WINDOW" else None)
@@ -167,7 +170,9 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
             return None
         return SlotTarget(item, item.active_material_index if self.slot < 0 else self.slot)
 
-    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> Generator[None, None, str]:
+    def apply(
+        self, context: bpy.types.Context, done: list["Outcome"]
+    ) -> Generator[None, None, str]:
         options = self.material_options()
         if isinstance(self._target, TreeTarget):
             return self._target.put(done[0].record, **options)
@@ -175,7 +180,7 @@ class LOBEFIT_OT_import_measured(RunsFits, bpy.types.Operator, ChoosesFiles):
         return ""
 
     def _make_materials(
-        self, done: Sequence[Outcome], options: dict[str, Any]
+        self, done: Sequence["Outcome"], options: dict[str, Any]
     ) -> Generator[None, None, None]:
         groups = {group.session_uid for group in bpy.data.node_groups}
         made: list[int] = []

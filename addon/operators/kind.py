@@ -1,19 +1,20 @@
 """Changes the kind of measured materials, one or many at once, without fitting them anew."""
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import EnumProperty
 
 from .. import native, nodes
-from ..jobs import Batch
 from ..locks import problem_of
-from ..parameters import is_edited
 from ..preferred import take_preferred
 from ..properties import KINDS, KindOptions, draw_kind_options
 from ..records import KEY, active_material, located, record_of
 from .polls import poll_changeable
 from .run import RunsWork
+
+if TYPE_CHECKING:  # It is loaded when it is used: Blender starts as soon as before.
+    from ..jobs import Batch
 
 _SCOPES = (
     ("ACTIVE", "Active Material", "The material of the panel"),
@@ -47,6 +48,8 @@ class LOBEFIT_OT_set_kind(KindOptions, RunsWork, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         import lobefit
 
+        from ..jobs import Batch
+
         take_preferred(self)
         self._ready: dict[int, Any] = {}
         self._wanting: list[int] = []
@@ -75,7 +78,7 @@ class LOBEFIT_OT_set_kind(KindOptions, RunsWork, bpy.types.Operator):
         options = {"closures": self.closures(), "threads": self.threads}
         return self.start(context, Batch(wanting, options))
 
-    def conclude(self, context: bpy.types.Context, work: Batch | None) -> set[str]:
+    def conclude(self, context: bpy.types.Context, work: "Batch | None") -> set[str]:
         for uid, outcome in zip(self._wanting, work.outcomes if work else (), strict=True):
             if outcome.record:
                 self._ready[uid] = outcome.record
@@ -84,7 +87,7 @@ class LOBEFIT_OT_set_kind(KindOptions, RunsWork, bpy.types.Operator):
         changed = [m for m in bpy.data.materials if m.session_uid in self._ready]
         for material in changed:
             record = self._ready[material.session_uid]
-            if is_edited(
+            if nodes.parameters.is_edited(
                 material, record_of(material), nodes.material.shown_by(material, record).kind
             ):
                 self._problems.append(f"{material.name}: what was edited in it was replaced")

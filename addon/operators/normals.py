@@ -1,7 +1,7 @@
 """Normals from the shading of images that are loaded, in the Image editor."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
@@ -11,40 +11,10 @@ from ..records import KEY, active_material, record_of
 from .import_measured import GLOB_DESCRIPTION
 from .run import RunsWork
 
+if TYPE_CHECKING:  # It is loaded when it is used: Blender starts as soon as before.
+    from ..jobs import Estimate
+
 SCALE_KEY = "lobefit_scale"  # of an image of heights: what 1 stands for, in widths of the image
-
-
-class Estimate:
-    """Normals under way, as `operators.run` asks for work; `problem` says why there are none."""
-
-    def __init__(self, job: Any) -> None:
-        self.surface: Any = None
-        self.problem = ""
-        self._job = job
-
-    @property
-    def progress(self) -> float:
-        """The share that is done, from 0 to 1."""
-        return self._job.progress
-
-    @property
-    def text(self) -> str:
-        """What is being done."""
-        return f"Normals from shading: {self._job.stage}"
-
-    def advance(self, seconds: float) -> bool:
-        """Waits at most `seconds` for the end; says whether it is reached."""
-        if not self._job.wait(seconds):
-            return False
-        try:
-            self.surface = self._job.surface()
-        except MemoryError:
-            self.problem = "Expected enough memory, found too little."
-        return True
-
-    def stop(self) -> None:
-        """Ends the job; its threads are gone when it is."""
-        self._job.cancel()
 
 
 class LOBEFIT_OT_find_normals(RunsWork, bpy.types.Operator):
@@ -125,13 +95,15 @@ node, and heights for displacement. The file of lights says which images belong 
     def execute(self, context: bpy.types.Context) -> set[str]:
         import lobefit
 
+        from ..jobs import Estimate
+
         try:
             job = self._job()
         except lobefit.InputError as error:
             return self.refuse(str(error))
         return self.start(context, Estimate(job))
 
-    def conclude(self, context: bpy.types.Context, work: Estimate) -> set[str]:
+    def conclude(self, context: bpy.types.Context, work: "Estimate") -> set[str]:
         if work.problem:
             return self.refuse(work.problem)
         import numpy as np

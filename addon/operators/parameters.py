@@ -5,7 +5,6 @@ from typing import ClassVar
 import bpy
 
 from .. import nodes
-from ..parameters import is_edited, reset
 from ..records import COUNT_KEY, KEY, KIND_KEY, active_material, has_bounces, record_of
 from .at_once import ActsAtOnce
 from .polls import poll_changeable
@@ -56,7 +55,8 @@ class LOBEFIT_OT_reset_parameters(_EditsMaterial, bpy.types.Operator):
         if not super().poll(context):
             return False
         material = active_material(context)
-        if not is_edited(material, record_of(material), material.get(KIND_KEY, "live")):
+        kind = material.get(KIND_KEY, "live")
+        if not nodes.parameters.is_edited(material, record_of(material), kind):
             cls.poll_message_set("Nothing was edited")
             return False
         return True
@@ -66,7 +66,7 @@ class LOBEFIT_OT_reset_parameters(_EditsMaterial, bpy.types.Operator):
 
         record = lobefit.Record.from_json(material[KEY], material.name)
         kind = material.get(KIND_KEY, "live")
-        if not reset(material, record_of(material), kind):
+        if not nodes.parameters.reset(material, record_of(material), kind):
             # Its nodes are no longer those of the record.
             count = material.get(COUNT_KEY) if kind in ("lobe", "measured") else None
             nodes.material.fill_material(

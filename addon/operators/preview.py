@@ -7,7 +7,6 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from .. import native, nodes, pictures
-from ..parameters import edited_shown, is_edited
 from ..records import KEY, active_material, located, record_of
 from .at_once import ActsAtOnce
 from .polls import poll_measured
@@ -49,8 +48,8 @@ def draw_spheres(
     record, measurement = measured(material)
     choice = nodes.material.shown_by(material, record)
     shown, caption, missing = choice.shown(record), "", ""
-    if is_edited(material, record_of(material), choice.kind):
-        edited = edited_shown(material, shown)
+    if nodes.parameters.is_edited(material, record_of(material), choice.kind):
+        edited = nodes.parameters.edited_shown(material, shown)
         if edited is None and rendered is None:
             missing = "No formula tells the material as it was edited: it is shown as fitted"
         shown = edited or shown
@@ -117,7 +116,9 @@ class LOBEFIT_OT_draw_chart(ActsAtOnce, bpy.types.Operator):
 
         record, measurement = measured(material)
         choice = nodes.material.shown_by(material, record)
-        shown = edited_shown(material, choice.shown(record)) or choice.shown(record)
+        shown = nodes.parameters.edited_shown(material, choice.shown(record)) or choice.shown(
+            record
+        )
         missing = "" if measurement else "The measured file is not found: the fitted lobe is drawn"
         if self.chart == "ERROR_MAP":
             picture = charts.draw_error_map(record, measurement, shown)

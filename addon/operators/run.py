@@ -2,13 +2,15 @@
 
 import time
 from collections.abc import Generator, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
 from .. import nodes
-from ..jobs import Batch, Outcome
 from ..properties import FitOptions
+
+if TYPE_CHECKING:  # It is loaded when it is used: Blender starts as soon as before.
+    from ..jobs import Batch, Outcome, Work
 
 POLL = 0.05  # seconds between two looks at a fit
 _MOST_LINES = 20  # of a pop-up that says what became of several files
@@ -20,28 +22,10 @@ _SHOWING = {"PROPERTIES": "WINDOW", "NODE_EDITOR": "UI"}
 Conclusion = Generator[None, None, set[str]]
 
 
-class Work(Protocol):
-    """What is done bit by bit: fits, or looking at a scene."""
-
-    @property
-    def progress(self) -> float:
-        """The share that is done, from 0 to 1."""
-
-    @property
-    def text(self) -> str:
-        """What is being done."""
-
-    def advance(self, seconds: float) -> bool:
-        """Goes on for about `seconds` or one indivisible bit; says whether all is done."""
-
-    def stop(self) -> None:
-        """Ends what runs in threads of its own."""
-
-
 class Run:
     """Work of an operator under way in a window, with the timer that looks after it."""
 
-    def __init__(self, context: bpy.types.Context, work: Work) -> None:
+    def __init__(self, context: bpy.types.Context, work: "Work") -> None:
         self.work = work
         self.conclusion: Conclusion | None = None
         self._began = time.monotonic()
@@ -110,7 +94,7 @@ class RunsWork:
         yield from ()
         return self.conclude(context, work)
 
-    def start(self, context: bpy.types.Context, work: Work) -> set[str]:
+    def start(self, context: bpy.types.Context, work: "Work") -> set[str]:
         """Does the work: in the background of a window, or waiting where nobody looks on."""
         global _current
         if bpy.app.background or not self.options.is_invoke:
@@ -172,15 +156,19 @@ def _result_of(conclusion: Conclusion) -> set[str]:
 class RunsFits(FitOptions, RunsWork):
     """What the operators that fit have in common; each says in `apply` what it does at the end."""
 
-    def apply(self, context: bpy.types.Context, done: list[Outcome]) -> Generator[None, None, str]:
+    def apply(
+        self, context: bpy.types.Context, done: list["Outcome"]
+    ) -> Generator[None, None, str]:
         """Changes the data-blocks in steps; its end is a sentence where that is not possible."""
         raise TypeError(f"{type(self).__name__} does not say what becomes of its fits")
 
     def fit(self, context: bpy.types.Context, paths: Sequence[str]) -> set[str]:
         """Fits the files."""
+        from ..jobs import Batch
+
         return self.start(context, Batch(paths, self.fit_options()))
 
-    def conclude_in_steps(self, context: bpy.types.Context, work: Batch) -> Conclusion:
+    def conclude_in_steps(self, context: bpy.types.Context, work: "Batch") -> Conclusion:
         done = [outcome for outcome in work.outcomes if outcome.record]
         failed = [outcome for outcome in work.outcomes if outcome.problem]
         problem = (yield from self.apply(context, done)) if done else ""
@@ -206,7 +194,7 @@ class RunsFits(FitOptions, RunsWork):
         return f"{record.name}: {shown.error(record):.1%} off, fitted in {seconds:.1f} s"
 
     def _sum_up(
-        self, context: bpy.types.Context, done: list[Outcome], failed: list[Outcome]
+        self, context: bpy.types.Context, done: list["Outcome"], failed: list["Outcome"]
     ) -> None:
         """Tells what became of several files, in the status bar and in a pop-up."""
         total = f"{len(done)} of {len(done) + len(failed)} files fitted"

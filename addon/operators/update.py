@@ -4,10 +4,9 @@ from typing import ClassVar
 
 import bpy
 
-from .. import native
+from .. import native, nodes
 from ..locks import problem_of
 from ..records import KEY
-from ..versions import is_outdated, update
 from .polls import poll_changeable
 
 
@@ -21,7 +20,7 @@ what is linked from other files is named and left as it is"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        found = list(filter(is_outdated, bpy.data.materials))
+        found = list(filter(nodes.versions.is_outdated, bpy.data.materials))
         if not found:
             cls.poll_message_set("No material of the file was made by an older Lobefit")
             return False
@@ -32,12 +31,13 @@ what is linked from other files is named and left as it is"""
         import lobefit
 
         updated, problems = [], []
-        for material in filter(is_outdated, list(bpy.data.materials)):
+        for material in filter(nodes.versions.is_outdated, list(bpy.data.materials)):
             reason = problem_of(material)
             try:
                 if reason:
                     raise ValueError(f"{material.name_full}: left as it is, {reason}")
-                update(material, lobefit.Record.from_json(material[KEY], material.name))
+                record = lobefit.Record.from_json(material[KEY], material.name)
+                nodes.versions.update(material, record)
                 updated.append(material.name)
             except (lobefit.InputError, ValueError) as error:
                 problems.append(str(error))

@@ -15,8 +15,8 @@ import lobefit
 import lobefit_addon
 from lobefit import blender, charts, lettering, picture, preview
 from lobefit.origin import write_samples
+from lobefit_addon import comparison
 from lobefit_addon.nodes.material import choose
-from lobefit_addon.operators import two_lights
 from lobefit_addon.scene import radiance
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,7 +35,7 @@ def letter(sheet: picture.Image, text: str, x: float, y: float, small: bool = Fa
 def two_spheres(record: lobefit.Record) -> picture.Image:
     """The scene of the extension with the measurement and the material beside it."""
     # The wheel does not carry the scene: it comes with the extension.
-    two_lights.BLEND = ROOT / "blend_files" / "two_lights.blend"
+    comparison.BLEND = ROOT / "blend_files" / "two_lights.blend"
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.object.data.materials.append(lobefit_addon.build_material(record, "measured"))
     with blender.quiet():

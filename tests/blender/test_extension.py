@@ -1,5 +1,6 @@
 """The extension as a whole: its coming and going, its panel, a module that is missing."""
 
+import importlib
 import shutil
 import subprocess
 import sys
@@ -131,7 +132,7 @@ def test_registering_loads_nothing_heavy(addon, tmp_path):
 
 def test_unregister_ends_a_fit(addon, measured_file):
     run = addon.operators.run
-    batch = addon.jobs.Batch([measured_file], {})
+    batch = importlib.import_module(f"{addon.__name__}.jobs").Batch([measured_file], {})
     batch.advance(0.0)
     run._current = run.Run(bpy.context, batch)
     try:

@@ -120,7 +120,7 @@ def test_what_it_cannot_start_with_is_refused(addon, lights, change, sentence):
 
 
 def test_work_tells_how_far_it_is_and_stops(addon):
-    from bl_ext.user_default.lobefit.operators.normals import Estimate
+    from bl_ext.user_default.lobefit.jobs import Estimate
 
     true, lighting = np.repeat(np.repeat(sphere(), 8, 0), 8, 1), ring()
     job = lobefit.normals.Job(shade(true, lighting, SOURCE), lighting, SOURCE, true.any(-1))

@@ -16,7 +16,7 @@ from recording_layout import drawn, material_tab, panels
 @pytest.fixture
 def parameters(addon):
     """The module that knows which inputs of a material are parameters."""
-    return importlib.import_module(f"{addon.__name__}.parameters")
+    return importlib.import_module(f"{addon.__name__}.nodes.parameters")
 
 
 @pytest.fixture

@@ -274,7 +274,7 @@ def test_add_live(shader_editor):
 def test_half_an_import_is_taken_back(addon, measured_file):
     operators = addon.operators.import_measured
     record = lobefit.closures(measured_file, count=1)
-    outcomes = [addon.jobs.Outcome("", record=record)] * 3
+    outcomes = [importlib.import_module(f"{addon.__name__}.jobs").Outcome("", record=record)] * 3
     before = data_blocks()
     stand_in = SimpleNamespace(_target=None, report=None)
     made = operators.LOBEFIT_OT_import_measured._make_materials(

@@ -9,8 +9,8 @@ from typing import Any
 
 import bpy
 
-from . import nodes
-from .records import BAKED
+from ..records import BAKED
+from . import baked, live, principled
 
 _AS_BAKED = {"Tint": [1.0, 1.0, 1.0], "Strength": 1.0}
 _EQUAL = 1e-5  # of values that are the same but for single precision
@@ -23,20 +23,18 @@ def parameter_nodes(material: bpy.types.Material, kind: str) -> list[bpy.types.N
         return [node for node in found if node.bl_idname == "ShaderNodeBsdfPrincipled"][:1]
     groups = [node for node in found if node.bl_idname == "ShaderNodeGroup" and node.node_tree]
     if kind in BAKED:
-        return [node for node in groups if nodes.baked.is_baked(node)]
-    return [node for node in groups if nodes.live.VERSION_KEY in node.node_tree]
+        return [node for node in groups if baked.is_baked(node)]
+    return [node for node in groups if live.VERSION_KEY in node.node_tree]
 
 
 def recorded_inputs(record: Mapping[str, Any], kind: str, count: int) -> list[dict[str, Any]]:
     """What the inputs of `count` such nodes are made with, by the names of their sockets."""
     if kind == "principled":
-        return [nodes.principled.principled_inputs(record["principled"])]
+        return [principled.principled_inputs(record["principled"])]
     if kind in BAKED:
         return [dict(_AS_BAKED)] * count
     # Of versions of the group from 3 on.
-    return [
-        inputs | {"Conserve Energy": 0.0} for inputs in nodes.live.live_inputs(record["parameters"])
-    ]
+    return [inputs | {"Conserve Energy": 0.0} for inputs in live.live_inputs(record["parameters"])]
 
 
 def is_edited(material: bpy.types.Material, record: Mapping[str, Any], kind: str) -> bool:
@@ -85,7 +83,7 @@ def _live(parameters: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str,
     if values["Fresnel"] not in (0.0, 1.0) or values.get("Conserve Energy", 0.0) > 0:
         return None
     exponent, interpolation = values["Exponent"], values["Interpolation"]
-    scale = values["Specular Strength"] / nodes.live.normal_albedo(exponent, interpolation)
+    scale = values["Specular Strength"] / live.normal_albedo(exponent, interpolation)
     return {
         "model": "interpolated",
         "diffuse": values["Base Color"],
@@ -96,10 +94,8 @@ def _live(parameters: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str,
     }
 
 
-def _principled(principled: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    return dict(principled) | {
-        name: values[socket] for name, socket in nodes.principled.SOCKETS.items()
-    }
+def _principled(recorded: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    return dict(recorded) | {name: values[socket] for name, socket in principled.SOCKETS.items()}
 
 
 def _baked(entry: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,9 +4,7 @@ from typing import Any
 
 import bpy
 
-from . import nodes
-from .parameters import parameter_nodes
-from .records import (
+from ..records import (
     BAKED,
     KIND_KEY,
     SCHEMA,
@@ -16,6 +14,9 @@ from .records import (
     has_bounces,
     record_of,
 )
+from . import baked, live
+from .material import fill_material, shown_by
+from .parameters import parameter_nodes
 
 
 def is_outdated(material: bpy.types.Material) -> bool:
@@ -24,7 +25,6 @@ def is_outdated(material: bpy.types.Material) -> bool:
         return False
     if material.get(VERSION_KEY, 0) < VERSION:
         return True
-    live = nodes.live
     groups = _groups(parameter_nodes(material, material.get(KIND_KEY, "live")))
     return any(
         group.node_tree.get(live.VERSION_KEY, live.VERSION) < live.VERSION for group in groups
@@ -43,18 +43,16 @@ def update(material: bpy.types.Material, record: Any) -> None:
     Values of the groups' inputs stay, and what is linked to them. Raises ValueError where the
     record does not hold what the material shows.
     """
-    choice = nodes.material.shown_by(material, record)
+    choice = shown_by(material, record)
     groups = _groups(parameter_nodes(material, choice.kind))
     if choice.kind == "live" and groups:
         for node in groups:
-            _exchange(node, nodes.live.live_group())
+            _exchange(node, live.live_group())
     elif choice.closures is not None and len(groups) == 1:
-        _exchange(groups[0], nodes.baked.baked_group(groups[0].node_tree.name, choice.closures))
+        _exchange(groups[0], baked.baked_group(groups[0].node_tree.name, choice.closures))
     elif choice.kind != "principled":
         count = choice.count if choice.kind in BAKED else None
-        nodes.material.fill_material(
-            material, record, choice.kind, count, diffuse_bounces=has_bounces(material)
-        )
+        fill_material(material, record, choice.kind, count, diffuse_bounces=has_bounces(material))
     material[VERSION_KEY] = VERSION
 
 
