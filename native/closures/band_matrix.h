@@ -23,6 +23,9 @@ class BandMatrix {
   auto below(Eigen::Index i, Eigen::Index j, Eigen::Index count) {
     return columns_.col(j).segment(i - j, count);
   }
+  auto below(Eigen::Index i, Eigen::Index j, Eigen::Index count) const {
+    return columns_.col(j).segment(i - j, count);
+  }
 
   // The x of matrix x = b, by Cholesky's method in place: the matrix holds its factor afterwards.
   // Pivots that rounding leaves below a tiny part of a unit diagonal count as that.

@@ -13,7 +13,7 @@ struct Band {
   double* elements;
   std::ptrdiff_t size, width, stride;
 };
-inline constexpr std::ptrdiff_t band_padding = 8;
+inline constexpr std::ptrdiff_t band_padding = 10;
 
 // Pivots that rounding leaves below this count as this.
 inline constexpr double least_pivot = 1e-12;

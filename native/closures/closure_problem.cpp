@@ -327,14 +327,16 @@ Eigen::MatrixXd step_from(const Eigen::MatrixXd& x, const Bounds& bounds,
   }
   const Eigen::Index band = equations.matrix.band();
   matrix.reset(count, band);
-  for (Eigen::Index j = 0; j < count; ++j) {
+  for (Eigen::Index j = 0, end = 0; j < count; ++j) {
     const Eigen::Index column = free[static_cast<std::size_t>(j)];
-    for (Eigen::Index i = j; i < count; ++i) {
-      const Eigen::Index row = free[static_cast<std::size_t>(i)];
-      if (row - column > band) break;
-      matrix(i, j) = scale[i] * scale[j] * equations.matrix(row, column);
+    while (end < count && free[static_cast<std::size_t>(end)] - column <= band) ++end;
+    const Eigen::Index* rows = free.data() + j;
+    const auto from = equations.matrix.below(column, column, band + 1);
+    auto to = matrix.below(j, j, end - j);
+    for (Eigen::Index i = 0; i < end - j; ++i) {
+      to[i] = scale[j + i] * scale[j] * from[rows[i] - column];
     }
-    matrix(j, j) += damping;
+    to[0] += damping;
   }
   const Eigen::VectorXd step = scale.cwiseProduct(
       matrix.solve_in_place(scale.cwiseProduct(equations.gradient(free).eval())));

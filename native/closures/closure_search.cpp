@@ -103,7 +103,7 @@ std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
 }
 
 // How many of what was found with few splines go on with many.
-constexpr std::size_t promising = 3;
+constexpr std::size_t promising = 2;
 
 class Search {
  public:
@@ -152,7 +152,7 @@ class Search {
       paths.emplace_back(small, constant, threads_, monitor_);
       start_from(starts);
       follow(small, 0.3, 5);
-      keep(12);
+      keep(10);
       for (ClosureCurves& path : paths.back().paths()) found_.push_back({std::move(path), 0});
       follow(medium_, 0.1, 10);
       keep(5);
@@ -160,7 +160,7 @@ class Search {
     }
     found_ = std::move(from_both);
     sort();
-    keep(5);
+    keep(4);
     return paths;
   }
 
