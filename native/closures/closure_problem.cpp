@@ -116,6 +116,51 @@ struct ViewEquations {
   CurveVector gradient;
 };
 
+// By how much more than it may of its albedo a view shows of a white world, in each channel.
+Eigen::Vector3d excess_at(const ClosureCurves& closures, const SearchView& view) {
+  const double most = most_beyond(view.angle.cosine);
+  return (albedo_beyond(closures, view.wo) / *view.limited_albedo - most).cwiseMax(0);
+}
+
+// So large that closures which gain by it are over the limit by a few per cent of it.
+constexpr double excess_weight = 200;
+
+// The square of an excess, times half the weight, and its equations by the curves' values.
+void add_excess(const ClosureCurves& closures, const SearchView& view, const AtView& at,
+                ViewEquations& equations) {
+  const Eigen::Vector3d excess = excess_at(closures, view);
+  if (excess.isZero(0)) return;
+  const ClosureLayout& layout = closures.layout;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves> by_curves;
+  by_curves.setZero(3, layout.curves());
+  for (int k = 0; k < layout.specular; ++k) {
+    const auto closure = static_cast<std::size_t>(k);
+    const Shape& shape = at.shapes[closure].shape;
+    const auto beyond = [&](const Shape& of) {
+      return Microfacet(closures.distributions[closure], of, view.wo).albedo_beyond() /
+             *view.limited_albedo;
+    };
+    const double here = beyond(shape);
+    Eigen::RowVector3d by_shape;
+    int i = 0;
+    for (const auto parameter : {&Shape::log_alpha_x, &Shape::log_alpha_y, &Shape::tilt}) {
+      constexpr double step = 1e-5;
+      Shape moved = shape;
+      moved.*parameter += step;
+      by_shape[i++] = (beyond(moved) - here) / step;
+    }
+    by_curves.middleCols<3>(layout.shape(k, 0)) =
+        at.curves.segment<3>(layout.weight(k, 0)) * by_shape *
+        shape_by_curves(at.shapes[closure], view.angle.sine);
+    for (int c = 0; c < 3; ++c) by_curves(c, layout.weight(k, c)) = here;
+  }
+  for (int c = 0; c < 3; ++c) {
+    if (excess[c] == 0) by_curves.row(c).setZero();
+  }
+  equations.gradient += excess_weight * by_curves.transpose() * excess;
+  equations.matrix += excess_weight * by_curves.transpose() * by_curves;
+}
+
 ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& view,
                              double smoothing) {
   const ClosureLayout& layout = closures.layout;
@@ -159,6 +204,7 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
       }
     }
   }
+  if (view.limited_albedo) add_excess(closures, view, at, result);
   return result;
 }
 
@@ -190,6 +236,9 @@ double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchVie
   for (const SearchView& view : target) {
     const AtView at = at_view(closures, view.angle);
     sum += run_closure_error(kernel_input(closures, at, view.wo, view.*lights, smoothing));
+    if (view.limited_albedo) {
+      sum += excess_weight / 2 * excess_at(closures, view).squaredNorm();
+    }
   }
   return sum + stiffness_penalty(closures);
 }
@@ -408,6 +457,22 @@ Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& c
     sum[k] *= at.curves.segment<3>(layout.weight(k, 0)).sum();
   }
   return sum;
+}
+
+Rgb albedo_beyond(const ClosureCurves& closures, const Vector3& wo) {
+  const ClosureLayout& layout = closures.layout;
+  const AtView at = at_view(closures, ViewAngle(wo.z()));
+  Rgb sum = Rgb::Zero();
+  for (int k = 0; k < layout.specular; ++k) {
+    sum += microfacet(closures, at, k, wo).albedo_beyond() *
+           at.curves.segment<3>(layout.weight(k, 0)).array();
+  }
+  return sum;
+}
+
+double most_beyond(double cosine) {
+  constexpr double most = 0.0085, flat_cosine = 0.16;
+  return most * std::max(1.0, square(flat_cosine / cosine));
 }
 
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "closures/closure_set.h"
@@ -47,6 +48,9 @@ struct SearchView {
   ViewAngle angle;
   Lights<double> lights;
   Lights<float> singles;  // the same in single precision
+  // Where it is given, closures with this albedo count as wrong for what lies beyond their horizons
+  // over most_beyond.
+  std::optional<double> limited_albedo = std::nullopt;
 };
 
 using SearchTarget = std::vector<SearchView>;
@@ -95,8 +99,15 @@ Shape shape_at(const ClosureCurves& closures, int closure, double cosine);
 // What each specular closure adds to the light of a view, in units of the error.
 Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures);
 
+// What closures show of a white world at a view angle but not of lamps, in each channel
+// (Microfacet::albedo_beyond), and which part of their albedo that may be: a hundredth, less
+// what the integral and curve nodes are off. Views flatter than 80 degrees are a thirtieth of a
+// sphere's picture; there it may be more and more.
+Rgb albedo_beyond(const ClosureCurves& closures, const Vector3& wo);
+double most_beyond(double cosine);
+
 // The error, |r| rounded off below `smoothing` times what is typical there, plus a little for
-// curvature.
+// curvature, and much for what is over a view's limit.
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing);
 
 // Levenberg and Marquardt's method on smooth_error, within the bounds of what Cycles can show; ends

@@ -104,6 +104,11 @@ std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
 
 // How many of what was found with few splines go on with many.
 constexpr std::size_t promising = 2;
+// |r| is rounded off below so many times what is typical, in the last descents.
+constexpr std::array<double, 2> last_smoothings = {0.01, 0.002};
+constexpr int last_iterations = 30;
+// Of the error that tells which closures are better.
+constexpr double judging_smoothing = 1e-3;
 
 class Search {
  public:
@@ -118,11 +123,12 @@ class Search {
   FoundCurves run(int specular) {
     std::vector<ClosureCurves> starts;
     if (specular == most_specular_closures) {
-      look_for(specular - 1, {}, 0, 0.25);
+      look_for(specular - 1, {}, 1, 0, 0.2);
       starts = extended(found_.front().closures);
     }
-    const double begun = starts.empty() ? 0 : 0.25;
-    const std::vector<ViewPaths> paths = look_for(specular, std::move(starts), begun, 0.5);
+    const double begun = starts.empty() ? 0 : 0.2;
+    const std::vector<ViewPaths> paths =
+        look_for(specular, std::move(starts), small_.size(), begun, 0.5);
     monitor_.report("Fitting closures", 0.5);
     follow(large_, 0.03, 20);
     keep(promising);
@@ -131,23 +137,24 @@ class Search {
     for (FoundCurves& found : found_) {
       for (int i = 0; i < 3; ++i) found.closures = subdivided(found.closures);
     }
-    for (const double smoothing : {0.01, 0.002}) follow(full_, smoothing, 30);
+    for (const double smoothing : last_smoothings) follow(full_, smoothing, last_iterations);
     return found_.front();
   }
 
  private:
   // Leaves promising closures in found_, with curves of few splines, some after these starts. Which
-  // of many near-equal ones are found depends on the choice of samples, so there are two.
-  std::vector<ViewPaths> look_for(int specular, std::vector<ClosureCurves> starts, double progress,
-                                  double progress_end) {
+  // of many near-equal ones are found depends on the choice of samples, so there are several.
+  std::vector<ViewPaths> look_for(int specular, std::vector<ClosureCurves> starts,
+                                  std::size_t thinnings, double progress, double progress_end) {
     const std::vector<ClosureCurves> constant = constant_starts(specular);
     if (starts.empty()) {
       for (const ClosureCurves& start : constant) starts.push_back(with_splines(start));
     }
     std::vector<FoundCurves> from_both;
     std::vector<ViewPaths> paths;
-    for (const SearchTarget& small : small_) {
-      const double share = static_cast<double>(paths.size()) / static_cast<double>(small_.size());
+    for (std::size_t i = 0; i < thinnings; ++i) {
+      const SearchTarget& small = small_[i];
+      const double share = static_cast<double>(i) / static_cast<double>(thinnings);
       monitor_.report("Trying closures", progress + share * (progress_end - progress));
       paths.emplace_back(small, constant, threads_, monitor_);
       start_from(starts);
@@ -193,7 +200,7 @@ class Search {
     parallel_for(static_cast<int>(found_.size()), threads_, [&](int i) {
       FoundCurves& found = found_[static_cast<std::size_t>(i)];
       found.closures = descend(target, std::move(found.closures), smoothing, iterations, monitor_);
-      found.error = smooth_error(target, found.closures, 1e-3);
+      found.error = smooth_error(target, found.closures, judging_smoothing);
     });
     sort();
   }
@@ -216,6 +223,12 @@ class Search {
 
 FoundCurves search_curves(const Target& target, int specular, int threads, Monitor& monitor) {
   return Search(target, threads, monitor).run(specular);
+}
+
+FoundCurves refined(const SearchTarget& target, ClosureCurves closures, const Monitor& monitor) {
+  closures = descend(target, std::move(closures), last_smoothings.back(), last_iterations, monitor);
+  const double error = smooth_error(target, closures, judging_smoothing);
+  return {std::move(closures), error};
 }
 
 }  // namespace lobefit

@@ -15,4 +15,7 @@ struct FoundCurves {
 // the target; the same for any number of threads. Reports progress from 0 to 1. Throws Cancelled.
 FoundCurves search_curves(const Target& target, int specular, int threads, Monitor& monitor);
 
+// The best curves near these. Throws Cancelled.
+FoundCurves refined(const SearchTarget& target, ClosureCurves closures, const Monitor& monitor);
+
 }  // namespace lobefit

@@ -80,6 +80,33 @@ std::vector<SeenAtAngle> look_at(const Target& target, const ClosureSet& closure
   return seen;
 }
 
+// Closures that are bent less where a white world would show too much of them, unless that costs
+// more than a fifth of their error.
+FoundCurves with_limited_bends(const Target& target, const FoundCurves& found,
+                               const Monitor& monitor) {
+  constexpr double most_cost = 1.2;
+  // Views are watched from a part of their limit on, and are over it by more than a part of it.
+  constexpr double watched = 0.7, over = 1.05;
+  SearchTarget views = in_columns(target);
+  FoundCurves limited = found;
+  // Views that were within the limit may come to be over it.
+  for (int round = 0; round < 3; ++round) {
+    const std::vector<SeenAtAngle> seen = look_at(
+        target, to_closures(limited.closures, curve_tolerance(limited.error), WeightFactors()));
+    bool exceeded = false;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const double albedo = seen[i].closures_albedo.maxCoeff();
+      const double part = albedo_beyond(limited.closures, views[i].wo).maxCoeff() /
+                          (albedo * most_beyond(seen[i].cosine));
+      if (part > watched) views[i].limited_albedo = albedo;
+      exceeded = exceeded || part > over;
+    }
+    if (!exceeded) break;
+    limited = refined(views, std::move(limited.closures), monitor);
+  }
+  return limited.error < most_cost * found.error ? limited : found;
+}
+
 // Where closures reflect more than they may, the factors that mend it.
 WeightFactors energy_factors(const std::vector<SeenAtAngle>& seen, bool cap_albedo) {
   constexpr double allowed = 1.01;
@@ -145,8 +172,9 @@ void leave_out(const Target& target, FittedClosures& fitted) {
 FittedClosures fit_closures(const Target& target, const ClosureFitOptions& options,
                             Monitor& monitor) {
   if (target.empty()) return {};
-  const FoundCurves best =
-      search_curves(target, options.specular, thread_count(options.threads), monitor);
+  const FoundCurves best = with_limited_bends(
+      target, search_curves(target, options.specular, thread_count(options.threads), monitor),
+      monitor);
   const double tolerance = curve_tolerance(best.error);
   WeightFactors factors;
   FittedClosures result{to_closures(best.closures, tolerance, factors), 0, {}};
