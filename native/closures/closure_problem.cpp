@@ -116,10 +116,19 @@ struct ViewEquations {
   CurveVector gradient;
 };
 
+Rgb albedo_beyond(const ClosureCurves& closures, const AtView& at, const Vector3& wo) {
+  Rgb sum = Rgb::Zero();
+  for (int k = 0; k < closures.layout.specular; ++k) {
+    sum += microfacet(closures, at, k, wo).albedo_beyond() *
+           at.curves.segment<3>(closures.layout.weight(k, 0)).array();
+  }
+  return sum;
+}
+
 // By how much more than it may of its albedo a view shows of a white world, in each channel.
-Eigen::Vector3d excess_at(const ClosureCurves& closures, const SearchView& view) {
+Eigen::Vector3d excess_at(const ClosureCurves& closures, const SearchView& view, const AtView& at) {
   const double most = most_beyond(view.angle.cosine);
-  return (albedo_beyond(closures, view.wo) / *view.limited_albedo - most).cwiseMax(0);
+  return (albedo_beyond(closures, at, view.wo) / *view.limited_albedo - most).cwiseMax(0);
 }
 
 // So large that closures which gain by it are over the limit by a few per cent of it.
@@ -128,7 +137,7 @@ constexpr double excess_weight = 200;
 // The square of an excess, times half the weight, and its equations by the curves' values.
 void add_excess(const ClosureCurves& closures, const SearchView& view, const AtView& at,
                 ViewEquations& equations) {
-  const Eigen::Vector3d excess = excess_at(closures, view);
+  const Eigen::Vector3d excess = excess_at(closures, view, at);
   if (excess.isZero(0)) return;
   const ClosureLayout& layout = closures.layout;
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves> by_curves;
@@ -237,7 +246,7 @@ double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchVie
     const AtView at = at_view(closures, view.angle);
     sum += run_closure_error(kernel_input(closures, at, view.wo, view.*lights, smoothing));
     if (view.limited_albedo) {
-      sum += excess_weight / 2 * excess_at(closures, view).squaredNorm();
+      sum += excess_weight / 2 * excess_at(closures, view, at).squaredNorm();
     }
   }
   return sum + stiffness_penalty(closures);
@@ -460,14 +469,7 @@ Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& c
 }
 
 Rgb albedo_beyond(const ClosureCurves& closures, const Vector3& wo) {
-  const ClosureLayout& layout = closures.layout;
-  const AtView at = at_view(closures, ViewAngle(wo.z()));
-  Rgb sum = Rgb::Zero();
-  for (int k = 0; k < layout.specular; ++k) {
-    sum += microfacet(closures, at, k, wo).albedo_beyond() *
-           at.curves.segment<3>(layout.weight(k, 0)).array();
-  }
-  return sum;
+  return albedo_beyond(closures, at_view(closures, ViewAngle(wo.z())), wo);
 }
 
 double most_beyond(double cosine) {

@@ -150,7 +150,7 @@ class Search {
     if (starts.empty()) {
       for (const ClosureCurves& start : constant) starts.push_back(with_splines(start));
     }
-    std::vector<FoundCurves> from_both;
+    std::vector<FoundCurves> from_all;
     std::vector<ViewPaths> paths;
     for (std::size_t i = 0; i < thinnings; ++i) {
       const SearchTarget& small = small_[i];
@@ -163,9 +163,9 @@ class Search {
       for (ClosureCurves& path : paths.back().paths()) found_.push_back({std::move(path), 0});
       follow(medium_, 0.1, 10);
       keep(5);
-      std::move(found_.begin(), found_.end(), std::back_inserter(from_both));
+      std::move(found_.begin(), found_.end(), std::back_inserter(from_all));
     }
-    found_ = std::move(from_both);
+    found_ = std::move(from_all);
     sort();
     keep(4);
     return paths;

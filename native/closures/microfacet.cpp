@@ -64,7 +64,8 @@ double Microfacet::visible(const Vector3& wi) const {
 
 double Microfacet::albedo_beyond() const {
   // What lies between is a wedge behind the mirrored viewer, of one elevation along each azimuth
-  // from there. Both steps crowd toward where a narrow closure reflects most. Within .05 of it.
+  // from there. Both steps crowd toward where a narrow closure reflects most. Within .05 of
+  // it, at a fifteenth of the nodes that live_lobe.cpp takes for a thousandth of all light.
   constexpr int azimuths = 16, elevations = 8;
   if (!(terms_.tilt > 0)) return 0;
   double sum = 0;

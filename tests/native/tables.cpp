@@ -138,6 +138,11 @@ void add_damaged(std::vector<ExtremeTable>& tables) {
   damaged("49 % spikes", [](int h, int d, int p, const Rgb& value) {
     return chance(h, d, p) < 0.49 ? Rgb(100 * value) : value;
   });
+  // Nothing tells which half are the spikes, so there is no truth to be found.
+  damaged("50 % spikes", [](int h, int d, int p, const Rgb& value) {
+    return chance(h, d, p) < 0.5 ? Rgb(100 * value) : value;
+  });
+  tables.back().truth.reset();
 }
 
 void add_other_models(std::vector<ExtremeTable>& tables) {
