@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "closures/band_matrix.h"
 #include "closures/closure_kernel.h"
+#include "closures/world_excess.h"
+#include "measurement/parallel.h"
 
 namespace lobefit {
 namespace {
@@ -116,57 +119,60 @@ struct ViewEquations {
   CurveVector gradient;
 };
 
-Rgb albedo_beyond(const ClosureCurves& closures, const AtView& at, const Vector3& wo) {
-  Rgb sum = Rgb::Zero();
-  for (int k = 0; k < closures.layout.specular; ++k) {
-    sum += microfacet(closures, at, k, wo).albedo_beyond() *
-           at.curves.segment<3>(closures.layout.weight(k, 0)).array();
-  }
-  return sum;
+template <bool derivatives>
+WorldExcess world_excess(const ClosureCurves& closures, const AtView& at, const Vector3& wo) {
+  const ClosureLayout& layout = closures.layout;
+  std::vector<Microfacet> seen;
+  for (int k = 0; k < layout.specular; ++k) seen.push_back(microfacet(closures, at, k, wo));
+  return world_excess<derivatives>(
+      seen, at.curves.tail(3 * layout.closures()).reshaped(3, layout.closures()));
 }
 
 // By how much more than it may of its albedo a view shows of a white world, in each channel.
-Eigen::Vector3d excess_at(const ClosureCurves& closures, const SearchView& view, const AtView& at) {
-  const double most = most_beyond(view.angle.cosine);
-  return (albedo_beyond(closures, at, view.wo) / *view.limited_albedo - most).cwiseMax(0);
+Eigen::Vector3d over_limit(const SearchView& view, const WorldExcess& excess) {
+  return (excess.albedo / *view.limited_albedo - most_excess(view.angle.cosine)).cwiseMax(0);
 }
 
 // So large that closures which gain by it are over the limit by a few per cent of it.
 constexpr double excess_weight = 200;
 
-// The square of an excess, times half the weight, and its equations by the curves' values.
+double excess_penalty(const ClosureCurves& closures, const SearchView& view, const AtView& at) {
+  if (!view.limited_albedo) return 0;
+  return excess_weight / 2 *
+         over_limit(view, world_excess<false>(closures, at, view.wo)).squaredNorm();
+}
+
+// Adds the equations of that penalty by the curves' values.
 void add_excess(const ClosureCurves& closures, const SearchView& view, const AtView& at,
                 ViewEquations& equations) {
-  const Eigen::Vector3d excess = excess_at(closures, view, at);
-  if (excess.isZero(0)) return;
+  if (!view.limited_albedo) return;
+  const WorldExcess excess = world_excess<true>(closures, at, view.wo);
+  const Eigen::Vector3d over = over_limit(view, excess);
+  if (over.isZero(0)) return;
   const ClosureLayout& layout = closures.layout;
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves> by_curves;
-  by_curves.setZero(3, layout.curves());
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves> by_curves(3, layout.curves());
+  by_curves.rightCols(3 * layout.closures()) = excess.by_weights;
   for (int k = 0; k < layout.specular; ++k) {
-    const auto closure = static_cast<std::size_t>(k);
-    const Shape& shape = at.shapes[closure].shape;
-    const auto beyond = [&](const Shape& of) {
-      return Microfacet(closures.distributions[closure], of, view.wo).albedo_beyond() /
-             *view.limited_albedo;
-    };
-    const double here = beyond(shape);
-    Eigen::RowVector3d by_shape;
+    constexpr double step = 1e-5;
+    AtView moved = at;
+    Shape& shape = moved.shapes[static_cast<std::size_t>(k)].shape;
+    Eigen::Matrix3d by_shape;
     int i = 0;
     for (const auto parameter : {&Shape::log_alpha_x, &Shape::log_alpha_y, &Shape::tilt}) {
-      constexpr double step = 1e-5;
-      Shape moved = shape;
-      moved.*parameter += step;
-      by_shape[i++] = (beyond(moved) - here) / step;
+      const double here = shape.*parameter;
+      shape.*parameter += step;
+      by_shape.col(i++) =
+          (world_excess<false>(closures, moved, view.wo).albedo - excess.albedo) / step;
+      shape.*parameter = here;
     }
     by_curves.middleCols<3>(layout.shape(k, 0)) =
-        at.curves.segment<3>(layout.weight(k, 0)) * by_shape *
-        shape_by_curves(at.shapes[closure], view.angle.sine);
-    for (int c = 0; c < 3; ++c) by_curves(c, layout.weight(k, c)) = here;
+        by_shape * shape_by_curves(at.shapes[static_cast<std::size_t>(k)], view.angle.sine);
   }
+  by_curves /= *view.limited_albedo;
   for (int c = 0; c < 3; ++c) {
-    if (excess[c] == 0) by_curves.row(c).setZero();
+    if (over[c] == 0) by_curves.row(c).setZero();
   }
-  equations.gradient += excess_weight * by_curves.transpose() * excess;
+  equations.gradient += excess_weight * by_curves.transpose() * over;
   equations.matrix += excess_weight * by_curves.transpose() * by_curves;
 }
 
@@ -213,7 +219,7 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
       }
     }
   }
-  if (view.limited_albedo) add_excess(closures, view, at, result);
+  add_excess(closures, view, at, result);
   return result;
 }
 
@@ -240,16 +246,17 @@ double stiffness_penalty(const ClosureCurves& closures) {
 // The error of a target's lights, in double or single precision, and the penalty.
 template <typename Scalar>
 double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchView::*lights,
-                const ClosureCurves& closures, double smoothing) {
-  double sum = 0;
-  for (const SearchView& view : target) {
+                const ClosureCurves& closures, double smoothing, int threads) {
+  std::vector<double> of_views(target.size());
+  parallel_for(static_cast<int>(target.size()), threads, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    const SearchView& view = target[index];
     const AtView at = at_view(closures, view.angle);
-    sum += run_closure_error(kernel_input(closures, at, view.wo, view.*lights, smoothing));
-    if (view.limited_albedo) {
-      sum += excess_weight / 2 * excess_at(closures, view, at).squaredNorm();
-    }
-  }
-  return sum + stiffness_penalty(closures);
+    of_views[index] =
+        run_closure_error(kernel_input(closures, at, view.wo, view.*lights, smoothing)) +
+        excess_penalty(closures, view, at);
+  });
+  return std::accumulate(of_views.begin(), of_views.end(), stiffness_penalty(closures));
 }
 
 // The unknowns stand coefficient after coefficient, so that each meets those of three coefficients
@@ -257,6 +264,7 @@ double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchVie
 struct Equations {
   BandMatrix matrix;
   Eigen::VectorXd gradient;
+  std::vector<ViewEquations> of_views;  // that these are the sums of
 };
 
 void add_penalty(const ClosureCurves& closures, Equations& equations) {
@@ -338,14 +346,19 @@ class SplineSums {
 };
 
 void linearise(const SearchTarget& target, const ClosureCurves& closures, double smoothing,
-               Equations& equations) {
+               int threads, Equations& equations) {
   const Eigen::Index curves = closures.x.rows();
   const int n = closures.coefficients();
   equations.matrix.reset(closures.x.size(), std::min(n, 4) * curves - 1);
   equations.gradient.setZero(closures.x.size());
+  equations.of_views.resize(target.size());
+  parallel_for(static_cast<int>(target.size()), threads, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    equations.of_views[index] = linearise_view(closures, target[index], smoothing);
+  });
   SplineSums sums(curves, equations);
-  for (const SearchView& view : target) {
-    sums.add(linearise_view(closures, view, smoothing), ViewSplines::at(view.angle.cosine, n));
+  for (std::size_t i = 0; i < target.size(); ++i) {
+    sums.add(equations.of_views[i], ViewSplines::at(target[i].angle.cosine, n));
   }
   sums.end();
   add_penalty(closures, equations);
@@ -468,24 +481,24 @@ Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& c
   return sum;
 }
 
-Rgb albedo_beyond(const ClosureCurves& closures, const Vector3& wo) {
-  return albedo_beyond(closures, at_view(closures, ViewAngle(wo.z())), wo);
+Rgb world_excess(const ClosureCurves& closures, const Vector3& wo) {
+  return world_excess<false>(closures, at_view(closures, ViewAngle(wo.z())), wo).albedo;
 }
 
-double most_beyond(double cosine) {
+double most_excess(double cosine) {
   constexpr double most = 0.0085, flat_cosine = 0.16;
   return most * std::max(1.0, square(flat_cosine / cosine));
 }
 
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing) {
-  return error_in(target, &SearchView::lights, closures, smoothing);
+  return error_in(target, &SearchView::lights, closures, smoothing, 1);
 }
 
 ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double smoothing,
-                      int iterations, const Monitor& monitor) {
+                      int iterations, const Monitor& monitor, int threads) {
   const Bounds bounds = bounds_of(closures.layout);
   const auto error_of = [&](const ClosureCurves& of) {
-    return error_in(target, &SearchView::singles, of, smoothing);
+    return error_in(target, &SearchView::singles, of, smoothing, threads);
   };
   double error = error_of(closures), damping = 1e-3;
   ClosureCurves tried = closures;
@@ -493,7 +506,7 @@ ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double
   BandMatrix matrix;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     monitor.throw_if_cancelled();
-    linearise(target, closures, smoothing, equations);
+    linearise(target, closures, smoothing, threads, equations);
     const double before = error;
     for (int attempt = 0; attempt < 6 && !(error < before); ++attempt) {
       tried.x = step_from(closures.x, bounds, equations, damping, matrix);

@@ -48,8 +48,8 @@ struct SearchView {
   ViewAngle angle;
   Lights<double> lights;
   Lights<float> singles;  // the same in single precision
-  // Where it is given, closures with this albedo count as wrong for what lies beyond their horizons
-  // over most_beyond.
+  // Where it is given, closures with this albedo count as wrong for what a white world shows too
+  // much of them over most_excess.
   std::optional<double> limited_albedo = std::nullopt;
 };
 
@@ -99,20 +99,21 @@ Shape shape_at(const ClosureCurves& closures, int closure, double cosine);
 // What each specular closure adds to the light of a view, in units of the error.
 Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures);
 
-// What closures show of a white world at a view angle but not of lamps, in each channel
-// (Microfacet::albedo_beyond), and which part of their albedo that may be: a hundredth, less
-// what the integral and curve nodes are off. Views flatter than 80 degrees are a thirtieth of a
-// sphere's picture; there it may be more and more.
-Rgb albedo_beyond(const ClosureCurves& closures, const Vector3& wo);
-double most_beyond(double cosine);
+// What a white world shows too much of closures at a view angle, in each channel (world_excess.h),
+// and which part of their albedo that may be: a hundredth, less what the integral and curve nodes
+// are off. Views flatter than 80 degrees are a thirtieth of a sphere's picture; there it may be
+// more and more.
+Rgb world_excess(const ClosureCurves& closures, const Vector3& wo);
+double most_excess(double cosine);
 
 // The error, |r| rounded off below `smoothing` times what is typical there, plus a little for
 // curvature, and much for what is over a view's limit.
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing);
 
 // Levenberg and Marquardt's method on smooth_error, within the bounds of what Cycles can show; ends
-// early where nothing is gained. Throws Cancelled.
+// early where nothing is gained. Its threads share the views; how many there are changes nothing.
+// Throws Cancelled.
 ClosureCurves descend(const SearchTarget& target, ClosureCurves closures, double smoothing,
-                      int iterations, const Monitor& monitor);
+                      int iterations, const Monitor& monitor, int threads = 1);
 
 }  // namespace lobefit

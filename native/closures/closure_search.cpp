@@ -225,8 +225,10 @@ FoundCurves search_curves(const Target& target, int specular, int threads, Monit
   return Search(target, threads, monitor).run(specular);
 }
 
-FoundCurves refined(const SearchTarget& target, ClosureCurves closures, const Monitor& monitor) {
-  closures = descend(target, std::move(closures), last_smoothings.back(), last_iterations, monitor);
+FoundCurves refined(const SearchTarget& target, ClosureCurves closures, int threads,
+                    const Monitor& monitor) {
+  closures = descend(target, std::move(closures), last_smoothings.back(), last_iterations, monitor,
+                     threads);
   const double error = smooth_error(target, closures, judging_smoothing);
   return {std::move(closures), error};
 }

@@ -16,6 +16,7 @@ struct FoundCurves {
 FoundCurves search_curves(const Target& target, int specular, int threads, Monitor& monitor);
 
 // The best curves near these. Throws Cancelled.
-FoundCurves refined(const SearchTarget& target, ClosureCurves closures, const Monitor& monitor);
+FoundCurves refined(const SearchTarget& target, ClosureCurves closures, int threads,
+                    const Monitor& monitor);
 
 }  // namespace lobefit

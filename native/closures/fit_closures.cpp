@@ -82,7 +82,7 @@ std::vector<SeenAtAngle> look_at(const Target& target, const ClosureSet& closure
 
 // Closures that are bent less where a white world would show too much of them, unless that costs
 // more than a fifth of their error.
-FoundCurves with_limited_bends(const Target& target, const FoundCurves& found,
+FoundCurves with_limited_bends(const Target& target, const FoundCurves& found, int threads,
                                const Monitor& monitor) {
   constexpr double most_cost = 1.2;
   // Views are watched from a part of their limit on, and are over it by more than a part of it.
@@ -96,13 +96,13 @@ FoundCurves with_limited_bends(const Target& target, const FoundCurves& found,
     bool exceeded = false;
     for (std::size_t i = 0; i < views.size(); ++i) {
       const double albedo = seen[i].closures_albedo.maxCoeff();
-      const double part = albedo_beyond(limited.closures, views[i].wo).maxCoeff() /
-                          (albedo * most_beyond(seen[i].cosine));
+      const double part = world_excess(limited.closures, views[i].wo).maxCoeff() /
+                          (albedo * most_excess(seen[i].cosine));
       if (part > watched) views[i].limited_albedo = albedo;
       exceeded = exceeded || part > over;
     }
     if (!exceeded) break;
-    limited = refined(views, std::move(limited.closures), monitor);
+    limited = refined(views, std::move(limited.closures), threads, monitor);
   }
   return limited.error < most_cost * found.error ? limited : found;
 }
@@ -172,9 +172,9 @@ void leave_out(const Target& target, FittedClosures& fitted) {
 FittedClosures fit_closures(const Target& target, const ClosureFitOptions& options,
                             Monitor& monitor) {
   if (target.empty()) return {};
+  const int threads = thread_count(options.threads);
   const FoundCurves best = with_limited_bends(
-      target, search_curves(target, options.specular, thread_count(options.threads), monitor),
-      monitor);
+      target, search_curves(target, options.specular, threads, monitor), threads, monitor);
   const double tolerance = curve_tolerance(best.error);
   WeightFactors factors;
   FittedClosures result{to_closures(best.closures, tolerance, factors), 0, {}};

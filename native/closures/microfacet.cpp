@@ -62,31 +62,6 @@ double Microfacet::visible(const Vector3& wi) const {
   return height / (masked + terms_.masking_o.value * height);
 }
 
-double Microfacet::albedo_beyond() const {
-  // What lies between is a wedge behind the mirrored viewer, of one elevation along each azimuth
-  // from there. Both steps crowd toward where a narrow closure reflects most. Within .05 of
-  // it, at a fifteenth of the nodes that live_lobe.cpp takes for a thousandth of all light.
-  constexpr int azimuths = 16, elevations = 8;
-  if (!(terms_.tilt > 0)) return 0;
-  double sum = 0;
-  for (int i = 0; i < azimuths; ++i) {
-    const double u = (i + 0.5) / azimuths, azimuth = pi / 2 * square(u);
-    const double greatest = std::atan(terms_.tilt * std::cos(azimuth));
-    const double width = pi * u / azimuths * greatest;
-    for (int j = 0; j < elevations; ++j) {
-      const double v = (j + 0.5) / elevations, elevation = greatest * (1 - square(v));
-      const double flat = std::cos(elevation);
-      const Vector3 wi(-flat * std::cos(azimuth), flat * std::sin(azimuth), std::sin(elevation));
-      const Vector3 half = (wi + wo_).normalized();
-      sum += width * 2 * v / elevations * flat *
-             closure_value<false, double, true>(terms_, {wi.x(), wi.y(), wi.z()},
-                                                {half.x(), half.y(), half.z()})
-                 .value;
-    }
-  }
-  return 2 * sum;  // on both sides of the plane of incidence
-}
-
 double Microfacet::evaluate(const Vector3& wi, const Vector3& half) const {
   return closure_value<false, double>(terms_, {wi.x(), wi.y(), wi.z()},
                                       {half.x(), half.y(), half.z()})

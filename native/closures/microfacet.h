@@ -37,14 +37,10 @@ class Microfacet {
   double evaluate(const Vector3& wi, const Vector3& half) const;
   // G alone, also for a light between the closure's own horizon and that of the surface.
   double visible(const Vector3& wi) const;
-  // The integral of the formula over the lights there, if the closure is bent toward the viewer.
-  // Until release 4.5 samples that Cycles draws may end there, so that a white world shows so much
-  // more than all lamps together; up to twice as much where other closures reflect there too, with
-  // whose light such samples are weighted.
-  double albedo_beyond() const;
 
   // What the formula with derivatives, closure_value in microfacet_terms.inc, takes.
   const MicrofacetTerms& terms() const { return terms_; }
+  const Vector3& wo() const { return wo_; }
 
  private:
   Vector3 wo_;
