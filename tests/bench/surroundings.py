@@ -1,10 +1,11 @@
 """What baked materials do whatever stands around them: ./dev bench surroundings FILE..
 
-For each measured file and the materials `measured` and `lobe` with 2 specular closures: how far the
-picture of a plane under a white world, at view angles from 0 to 80 degrees, is off what the formula
-integrates to (at most 0.01 of it is wanted). Then all these materials at once on surfaces of random
-flat, smooth and connected normals under random lights (tests/blender/surroundings.py): how many of
-so many pixels are NaN, infinite, negative, or black without a reason (none is wanted).
+For each measured file and the materials `measured` with 2 and 3 specular closures and `lobe` with
+2: how far the picture of a plane under a white world, at view angles from 0 to 80 degrees, is off
+what the formula integrates to (at most 0.01 of it is wanted). Then all these materials at once on
+surfaces of random flat, smooth and connected normals under random lights
+(tests/blender/surroundings.py): how many of so many pixels are NaN, infinite, negative, or black
+without a reason (none is wanted).
 """
 
 import argparse
@@ -24,7 +25,7 @@ from lobefit_addon.scene import uniform_world
 sys.path.insert(0, str(Path(__file__).parents[1] / "blender"))
 from surroundings import Crowd, albedo, bend_as_crowds_do, white_world_albedo
 
-ANGLES = (0, 15, 30, 45, 60, 70, 75, 80)
+ANGLES = (0, 15, 22, 30, 38, 45, 52, 60, 65, 70, 75, 80)
 CROWD = 400  # pixels across
 
 
@@ -76,7 +77,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=63)
     options = parser.parse_args()
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    requests = [lobefit.Closures(count=2), lobefit.Closures("lobe", 2)]
+    requests = [lobefit.Closures(count=2), lobefit.Closures(count=3), lobefit.Closures("lobe", 2)]
     crowd = []
     angles = " | ".join(f"{angle} degrees" for angle in ANGLES)
     print(f"| table | material | {angles} |\n" + "|---" * (2 + len(ANGLES)) + "|")
