@@ -486,7 +486,7 @@ Rgb world_excess(const ClosureCurves& closures, const Vector3& wo) {
 }
 
 double most_excess(double cosine) {
-  constexpr double most = 0.0085, flat_cosine = 0.16;
+  constexpr double most = 0.0088, flat_cosine = 0.16;
   return most * std::max(1.0, square(flat_cosine / cosine));
 }
 

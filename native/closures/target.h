@@ -39,7 +39,9 @@ using Target = std::vector<TargetView>;
 Target sample_target(const Reflectance& f, int threads = 1);
 
 // The same with every so many-th view and light alone, which stand for the others; at least one of
-// each. Another choice of them has other views and lights.
+// each. Where there are twice as many views of half the lights each, for a narrow highlight, it is
+// twice as many views and half as many lights that are left out. Another choice of them has other
+// views and lights.
 Target thinned(const Target& target, std::size_t view_stride, std::size_t light_stride,
                std::size_t choice = 0);
 

@@ -345,6 +345,31 @@ TEST(ClosuresTarget, AThinnedOneStandsForTheWhole) {
   EXPECT_EQ(thinned(target, 3, 1).size(), target.size() / 3);
 }
 
+TEST(ClosuresTarget, ANarrowHighlightIsSeenFromTwiceAsManyViews) {
+  const auto lobe = [](double exponent) -> Reflectance {
+    return [exponent](const Vector3& wi, const Vector3& wo) {
+      return Rgb(Rgb::Constant(std::pow((wi + wo).normalized().z(), exponent)));
+    };
+  };
+  const Target broad = sample_target(lobe(200)), narrow = sample_target(lobe(20000));
+  EXPECT_EQ(narrow.size(), 2 * broad.size());
+  const auto lights = [](const Target& target) {
+    std::size_t sum = 0;
+    for (const TargetView& view : target) sum += view.lights.size();
+    return static_cast<double>(sum);
+  };
+  // But for how many are below the horizon.
+  EXPECT_NEAR(lights(narrow), lights(broad), 0.02 * lights(broad));
+  const double sixth = lights(thinned(broad, 3, 2));
+  EXPECT_NEAR(lights(thinned(narrow, 3, 2)), sixth, 0.05 * sixth);
+  const auto other = [of = lobe(15000)](const Vector3& wi, const Vector3& wo) {
+    return Rgb(of(wi, wo) * wi.z());
+  };
+  const double error = error_of(narrow, other);
+  // A sixth of the samples: the sums differ by less than the views do.
+  EXPECT_NEAR(error_of(thinned(narrow, 3, 2), other), error, 0.1 * error);
+}
+
 TEST(ClosuresTarget, UnknownLightsAreLeftOut) {
   const Target target = sample_target([](const Vector3& wi, const Vector3&) {
     return Rgb(Rgb::Constant(wi.y() > 0 ? 1 : std::nan("")));
