@@ -13,7 +13,7 @@ namespace {
 
 // Where a highlight is narrow, there are twice as many views with every second light, so that
 // closures are held between views too: NP-MERL chrome's, fitted at 162 views, were off by .124 at
-// these and by .145 on a sphere; at 324 by .120 and .137.
+// these and by .145 on a sphere; at 324 by .118 and .135.
 constexpr int fewest_views = 162, rings = 28, sectors = 14;
 // sqrt(cos theta) of the views: evenly spaced, so that they crowd at grazing angles, where
 // reflectance changes fastest.
