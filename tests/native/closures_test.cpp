@@ -437,7 +437,7 @@ TEST(ClosuresFit, IsBentOnlySoFarThatAWhiteWorldShowsWhatLampsDo) {
   const Target target = sample_target([](const Vector3& wi, const Vector3& wo) -> Rgb {
     return Rgb::Constant(std::max(0.0, wi.z() * wo.z() - wi.x() * wo.x() - wi.y() * wo.y()));
   });
-  const FittedClosures found = fitted(target, {.specular = 2});
+  const FittedClosures found = fitted(target, {.specular = 2, .threads = 3});
   ASSERT_EQ(found.closures.specular.size(), 2);
   double most_bent = 0;
   for (const SeenAtAngle& at : found.by_view) {
@@ -459,6 +459,8 @@ TEST(ClosuresFit, IsBentOnlySoFarThatAWhiteWorldShowsWhatLampsDo) {
     EXPECT_LE(excess, 0.01 * at.closures_albedo[1]) << at.cosine;
   }
   EXPECT_GT(most_bent, 0.2) << "nothing had to be limited";
+  // Views that several threads share are added up in the same order.
+  EXPECT_EQ(fitted(target, {.specular = 2, .threads = 1}).error, found.error);
 }
 
 TEST(ClosuresFit, ASingleViewAngleWithAFewLightsIsEnough) {
