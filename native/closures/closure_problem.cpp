@@ -119,13 +119,16 @@ struct ViewEquations {
   CurveVector gradient;
 };
 
-template <bool derivatives>
-WorldExcess world_excess(const ClosureCurves& closures, const AtView& at, const Vector3& wo) {
-  const ClosureLayout& layout = closures.layout;
-  std::vector<Microfacet> seen;
-  for (int k = 0; k < layout.specular; ++k) seen.push_back(microfacet(closures, at, k, wo));
-  return world_excess<derivatives>(
-      seen, at.curves.tail(3 * layout.closures()).reshaped(3, layout.closures()));
+std::vector<Microfacet> microfacets(const ClosureCurves& closures, const AtView& at,
+                                    const Vector3& wo) {
+  std::vector<Microfacet> all;
+  for (int k = 0; k < closures.layout.specular; ++k) all.push_back(microfacet(closures, at, k, wo));
+  return all;
+}
+
+// The weights of all closures at a view, in columns.
+auto weights_of(const ClosureLayout& layout, const AtView& at) {
+  return at.curves.tail(3 * layout.closures()).reshaped(3, layout.closures());
 }
 
 // By how much more than it may of its albedo a view shows of a white world, in each channel.
@@ -138,35 +141,38 @@ constexpr double excess_weight = 200;
 
 double excess_penalty(const ClosureCurves& closures, const SearchView& view, const AtView& at) {
   if (!view.limited_albedo) return 0;
-  return excess_weight / 2 *
-         over_limit(view, world_excess<false>(closures, at, view.wo)).squaredNorm();
+  const WorldExcess excess =
+      world_excess<false>(microfacets(closures, at, view.wo), weights_of(closures.layout, at));
+  return excess_weight / 2 * over_limit(view, excess).squaredNorm();
 }
 
 // Adds the equations of that penalty by the curves' values.
 void add_excess(const ClosureCurves& closures, const SearchView& view, const AtView& at,
                 ViewEquations& equations) {
   if (!view.limited_albedo) return;
-  const WorldExcess excess = world_excess<true>(closures, at, view.wo);
+  const ClosureLayout& layout = closures.layout;
+  std::vector<Microfacet> seen = microfacets(closures, at, view.wo);
+  const WorldExcess excess = world_excess<true>(seen, weights_of(layout, at));
   const Eigen::Vector3d over = over_limit(view, excess);
   if (over.isZero(0)) return;
-  const ClosureLayout& layout = closures.layout;
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves> by_curves(3, layout.curves());
   by_curves.rightCols(3 * layout.closures()) = excess.by_weights;
   for (int k = 0; k < layout.specular; ++k) {
     constexpr double step = 1e-5;
-    AtView moved = at;
-    Shape& shape = moved.shapes[static_cast<std::size_t>(k)].shape;
+    const auto index = static_cast<std::size_t>(k);
+    const Microfacet here = seen[index];
     Eigen::Matrix3d by_shape;
     int i = 0;
     for (const auto parameter : {&Shape::log_alpha_x, &Shape::log_alpha_y, &Shape::tilt}) {
-      const double here = shape.*parameter;
-      shape.*parameter += step;
+      Shape moved = at.shapes[index].shape;
+      moved.*parameter += step;
+      seen[index] = Microfacet(closures.distributions[index], moved, view.wo);
       by_shape.col(i++) =
-          (world_excess<false>(closures, moved, view.wo).albedo - excess.albedo) / step;
-      shape.*parameter = here;
+          (world_excess<false>(seen, weights_of(layout, at)).albedo - excess.albedo) / step;
     }
+    seen[index] = here;
     by_curves.middleCols<3>(layout.shape(k, 0)) =
-        by_shape * shape_by_curves(at.shapes[static_cast<std::size_t>(k)], view.angle.sine);
+        by_shape * shape_by_curves(at.shapes[index], view.angle.sine);
   }
   by_curves /= *view.limited_albedo;
   for (int c = 0; c < 3; ++c) {
@@ -264,7 +270,6 @@ double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchVie
 struct Equations {
   BandMatrix matrix;
   Eigen::VectorXd gradient;
-  std::vector<ViewEquations> of_views;  // that these are the sums of
 };
 
 void add_penalty(const ClosureCurves& closures, Equations& equations) {
@@ -351,17 +356,42 @@ void linearise(const SearchTarget& target, const ClosureCurves& closures, double
   const int n = closures.coefficients();
   equations.matrix.reset(closures.x.size(), std::min(n, 4) * curves - 1);
   equations.gradient.setZero(closures.x.size());
-  equations.of_views.resize(target.size());
-  parallel_for(static_cast<int>(target.size()), threads, [&](int i) {
-    const auto index = static_cast<std::size_t>(i);
-    equations.of_views[index] = linearise_view(closures, target[index], smoothing);
-  });
+  // Made by all threads and then added up in order, so many at a time that they stay in the cache.
+  std::array<ViewEquations, 16> of_views;
   SplineSums sums(curves, equations);
-  for (std::size_t i = 0; i < target.size(); ++i) {
-    sums.add(equations.of_views[i], ViewSplines::at(target[i].angle.cosine, n));
+  for (std::size_t first = 0; first < target.size(); first += of_views.size()) {
+    const std::size_t count = std::min(of_views.size(), target.size() - first);
+    parallel_for(static_cast<int>(count), threads, [&](int i) {
+      const auto index = static_cast<std::size_t>(i);
+      of_views[index] = linearise_view(closures, target[first + index], smoothing);
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      sums.add(of_views[i], ViewSplines::at(target[first + i].angle.cosine, n));
+    }
   }
   sums.end();
   add_penalty(closures, equations);
+}
+
+// The closures with one more at a place among the specular ones.
+ClosureCurves with_closure(const ClosureCurves& closures, int place, Distribution distribution,
+                           double alpha) {
+  constexpr double faint = 1e-3;
+  const ClosureLayout &from = closures.layout, to{from.specular + 1};
+  ClosureCurves more{to, closures.distributions,
+                     Eigen::MatrixXd::Zero(to.curves(), closures.coefficients())};
+  more.distributions.insert(more.distributions.begin() + place, distribution);
+  for (int k = 0; k < from.closures(); ++k) {
+    const int moved = k < place ? k : k + 1;
+    const auto copy = [&](int row, int of_row) {
+      more.x.middleRows<3>(row) = closures.x.middleRows<3>(of_row);
+    };
+    copy(to.weight(moved, 0), from.weight(k, 0));
+    if (k < from.specular) copy(to.shape(moved, 0), from.shape(k, 0));
+  }
+  more.x.row(to.shape(place, mean)).setConstant(std::log(alpha));
+  more.x.middleRows<3>(to.weight(place, 0)).setConstant(faint);
+  return more;
 }
 
 struct Bounds {
@@ -456,6 +486,15 @@ ClosureCurves subdivided(const ClosureCurves& closures) {
   return finer;
 }
 
+std::vector<ClosureCurves> extended(const ClosureCurves& closures) {
+  std::vector<ClosureCurves> all;
+  for (const double alpha : {0.008, 0.025, 0.07, 0.17, 0.4, 0.9}) {
+    all.push_back(with_closure(closures, 0, Distribution::beckmann, alpha));
+    all.push_back(with_closure(closures, closures.layout.specular, Distribution::ggx, alpha));
+  }
+  return all;
+}
+
 ClosureCurves constant_at(const ClosureCurves& closures, double cosine) {
   return {closures.layout, closures.distributions, at_view(closures, ViewAngle(cosine)).curves};
 }
@@ -482,7 +521,8 @@ Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& c
 }
 
 Rgb world_excess(const ClosureCurves& closures, const Vector3& wo) {
-  return world_excess<false>(closures, at_view(closures, ViewAngle(wo.z())), wo).albedo;
+  const AtView at = at_view(closures, ViewAngle(wo.z()));
+  return world_excess<false>(microfacets(closures, at, wo), weights_of(closures.layout, at)).albedo;
 }
 
 double most_excess(double cosine) {

@@ -90,6 +90,10 @@ struct ClosureCurves {
 // The same closures, their curves of the same course by splines of half the width.
 ClosureCurves subdivided(const ClosureCurves& closures);
 
+// The same closures with one specular closure more, all but black: so they can only become better.
+// One set for each of both distributions and some widths; Beckmann closures come first.
+std::vector<ClosureCurves> extended(const ClosureCurves& closures);
+
 // The values of all curves at a view angle: the same closures there, with constant curves.
 ClosureCurves constant_at(const ClosureCurves& closures, double cosine);
 

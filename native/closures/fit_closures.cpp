@@ -90,7 +90,7 @@ FoundCurves with_limited_bends(const Target& target, const FoundCurves& found, i
   SearchTarget views = in_columns(target);
   FoundCurves limited = found;
   // Views that were within the limit may come to be over it.
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < 4; ++round) {
     const std::vector<SeenAtAngle> seen = look_at(
         target, to_closures(limited.closures, curve_tolerance(limited.error), WeightFactors()));
     bool exceeded = false;

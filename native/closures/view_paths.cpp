@@ -19,53 +19,73 @@ constexpr double smoothing = 0.03;
 // Most starts lead to the same few optima: after the first iterations the better half goes on.
 constexpr int first_iterations = 6, iterations = 8;
 // Optima of a view that are told apart, and what part of the light has to be off for that.
-constexpr int most_optima = 6;
+constexpr std::size_t most_optima = 8;
 constexpr double alike = 0.02;
+// How many of them, the best first, are starts for one closure more, and for the angles beside.
+constexpr std::size_t most_extended = 2, most_spread = 3;
 
 double root_of(const SearchTarget& view) { return std::sqrt(view.front().wo.z()); }
 
 }  // namespace
 
-ViewPaths::ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>& starts,
-                     int threads, const Monitor& monitor)
+ViewPaths::ViewPaths(const SearchTarget& views, int threads, const Monitor& monitor)
     : threads_(threads) {
-  views_.reserve(views.size());
-  for (const SearchView& view : views) views_.push_back({view});
-  std::map<std::vector<Distribution>, std::vector<ClosureCurves>> groups;
-  for (const ClosureCurves& start : starts) groups[start.distributions].push_back(start);
-  for (const auto& each : groups) {
-    const std::vector<ClosureCurves>& group = each.second;
-    OptimaByView& optima = by_distributions_[each.first];
-    optima.resize(views_.size());
-    parallel_for(static_cast<int>(views_.size()), threads, [&](int job) {
-      const auto view = static_cast<std::size_t>(job);
-      optima[view] = optima_from(view, group, monitor);
-    });
+  const ClosureLayout diffuse{0};
+  const ClosureCurves start{diffuse, {}, Eigen::MatrixXd::Zero(diffuse.curves(), 1)};
+  OptimaByView& optima = by_distributions_[start.distributions];
+  for (const SearchView& view : views) {
+    views_.push_back({view});
+    optima.push_back(optima_from(views_.size() - 1, {start}, monitor));
   }
 }
 
-std::vector<ClosureCurves> ViewPaths::paths() const {
+ViewPaths ViewPaths::with_one_more(const Monitor& monitor) const {
+  std::vector<std::map<std::vector<Distribution>, std::vector<ClosureCurves>>> starts(
+      views_.size());
+  for (const auto& [distributions, by_view] : by_distributions_) {
+    for (std::size_t view = 0; view < views_.size(); ++view) {
+      for (std::size_t i = 0; i < std::min(most_extended, by_view[view].size()); ++i) {
+        for (ClosureCurves& start : extended(by_view[view][i].closures)) {
+          starts[view][start.distributions].push_back(std::move(start));
+        }
+      }
+    }
+  }
+  ViewPaths more(views_, threads_);
+  std::vector<OptimaByView*> all;
+  for (const auto& [distributions, of_first] : starts.front()) {
+    OptimaByView& optima = more.by_distributions_[distributions];
+    optima.resize(views_.size());
+    parallel_for(static_cast<int>(views_.size()), threads_, [&, &choice = distributions](int job) {
+      const auto view = static_cast<std::size_t>(job);
+      optima[view] = more.optima_from(view, starts[view].at(choice), monitor);
+    });
+    all.push_back(&optima);
+  }
+  parallel_for(static_cast<int>(all.size()), threads_,
+               [&](int job) { more.spread(*all[static_cast<std::size_t>(job)], monitor); });
+  return more;
+}
+
+// What is best at one view angle is near the best of the next, but can be far from all starts.
+void ViewPaths::spread(OptimaByView& optima, const Monitor& monitor) const {
+  const auto take_over = [&](std::size_t to, std::size_t from) {
+    Optima both = optima[to];
+    for (std::size_t i = 0; i < std::min(most_spread, optima[from].size()); ++i) {
+      both.push_back(optimum(to, optima[from][i].closures, monitor));
+    }
+    optima[to] = distinct(std::move(both));
+  };
+  for (std::size_t view = 1; view < optima.size(); ++view) take_over(view, view - 1);
+  for (std::size_t view = optima.size() - 1; view-- > 0;) take_over(view, view + 1);
+}
+
+std::vector<ClosureCurves> ViewPaths::ways() const {
   std::vector<ClosureCurves> all;
   for (const auto& [distributions, optima] : by_distributions_) {
     for (ClosureCurves& closures : ways(optima)) all.push_back(std::move(closures));
   }
   return all;
-}
-
-std::vector<ClosureCurves> ViewPaths::detours(const ClosureCurves& closures,
-                                              const Monitor& monitor) const {
-  Optima own(views_.size());
-  parallel_for(static_cast<int>(views_.size()), threads_, [&](int job) {
-    const auto view = static_cast<std::size_t>(job);
-    own[view] = optimum(view, constant_at(closures, views_[view].front().wo.z()), monitor);
-  });
-  const auto known = by_distributions_.find(closures.distributions);
-  OptimaByView optima =
-      known == by_distributions_.end() ? OptimaByView(views_.size()) : known->second;
-  for (std::size_t view = 0; view < views_.size(); ++view) {
-    optima[view].insert(optima[view].begin(), std::move(own[view]));
-  }
-  return ways(optima);
 }
 
 ViewPaths::Optima ViewPaths::optima_from(std::size_t view, const std::vector<ClosureCurves>& starts,
@@ -113,19 +133,17 @@ double ViewPaths::jump(const Optimum& from, const Optimum& to) {
   return sum;
 }
 
-// The best of the optima that are not alike, in every order.
+// The best of the optima that are not alike.
 ViewPaths::Optima ViewPaths::distinct(Optima optima) {
   std::stable_sort(optima.begin(), optima.end(),
                    [](const Optimum& a, const Optimum& b) { return a.error < b.error; });
   Optima kept;
-  int count = 0;
   for (const Optimum& next : optima) {
     const bool known = std::any_of(kept.begin(), kept.end(), [&](const Optimum& other) {
-      return jump(other, next) < alike * next.light.sum();
+      return jump(other, next) <= alike * next.light.sum();
     });
-    if (known) continue;
-    for (Optimum& ordered : in_every_order(next)) kept.push_back(std::move(ordered));
-    if (++count == most_optima) break;
+    if (!known) kept.push_back(next);
+    if (kept.size() == most_optima) break;
   }
   return kept;
 }
@@ -159,9 +177,15 @@ ViewPaths::Optima ViewPaths::in_every_order(const Optimum& optimum) {
 }
 
 std::vector<ClosureCurves> ViewPaths::ways(const OptimaByView& optima) const {
+  OptimaByView ordered(optima.size());
+  for (std::size_t view = 0; view < optima.size(); ++view) {
+    for (const Optimum& each : optima[view]) {
+      for (Optimum& order : in_every_order(each)) ordered[view].push_back(std::move(order));
+    }
+  }
   std::vector<Path> found;
   for (const double reluctance : reluctances) {
-    Path path = way(optima, reluctance);
+    Path path = way(ordered, reluctance);
     if (std::find(found.begin(), found.end(), path) == found.end()) found.push_back(path);
   }
   std::vector<ClosureCurves> result;

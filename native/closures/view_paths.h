@@ -14,16 +14,15 @@ namespace lobefit {
 // together with how much they jump, are least (Viterbi's algorithm), and curves start from there.
 class ViewPaths {
  public:
-  // Fits closures, all of one number, to each view by itself from each of the starts, which have
-  // constant curves. Throws Cancelled.
-  ViewPaths(const SearchTarget& views, const std::vector<ClosureCurves>& starts, int threads,
-            const Monitor& monitor);
+  // The diffuse closure alone at each view.
+  ViewPaths(const SearchTarget& views, int threads, const Monitor& monitor);
+
+  // Those of one specular closure more, found from each of these optima with another of any width
+  // and then from what is best at the angles beside. Throws Cancelled.
+  ViewPaths with_one_more(const Monitor& monitor) const;
 
   // The best ways, for each choice of distributions and each reluctance to jump.
-  std::vector<ClosureCurves> paths() const;
-
-  // The best ways that may also follow the optima next to these closures.
-  std::vector<ClosureCurves> detours(const ClosureCurves& closures, const Monitor& monitor) const;
+  std::vector<ClosureCurves> ways() const;
 
  private:
   // Closures at one view, with what they add to its light and what they look like there.
@@ -37,9 +36,12 @@ class ViewPaths {
   using OptimaByView = std::vector<Optima>;
   using Path = std::vector<const Optimum*>;  // one of each view
 
+  ViewPaths(const std::vector<SearchTarget>& views, int threads)
+      : views_(views), threads_(threads) {}
   Optima optima_from(std::size_t view, const std::vector<ClosureCurves>& starts,
                      const Monitor& monitor) const;
   Optimum optimum(std::size_t view, const ClosureCurves& start, const Monitor& monitor) const;
+  void spread(OptimaByView& optima, const Monitor& monitor) const;
   std::vector<ClosureCurves> ways(const OptimaByView& optima) const;
   Path way(const OptimaByView& optima, double reluctance) const;
   ClosureCurves through(const Path& path) const;
