@@ -404,6 +404,29 @@ TEST(ClosuresFit, FindsWhatIsKnown) {
   for (std::size_t c = 0; c < 3; ++c) expect_equal(a.weight[c], b.weight[c]);
 }
 
+// The lesser one is wider across the plane of incidence and bent away from the viewer, about as
+// NP-MERL special-walnut-224's are.
+TEST(ClosuresFit, FindsTwoThatOverlap) {
+  const auto curve = [](double (*function)(double)) {
+    return ViewCurve::following(function, 1e-5);
+  };
+  SpecularClosure lesser, greater;
+  lesser.roughness = curve([](double c) { return 0.38 + 0.08 * c; });
+  lesser.anisotropy = curve([](double c) { return 0.5 * (1 - c * c); });
+  lesser.bend = curve([](double c) { return -0.25 * c; });
+  lesser.weight = grey(0.01);
+  greater.roughness = ViewCurve(0.47);
+  greater.anisotropy = curve([](double c) { return 0.15 * (1 - c * c); });
+  greater.bend = ViewCurve(0.03);
+  greater.weight = {curve([](double c) { return 0.05 - 0.03 * c; }),
+                    curve([](double c) { return 0.05 - 0.03 * c; }),
+                    curve([](double c) { return 0.05 - 0.03 * c; })};
+  const Target target = sample_target(reflectance_of({grey(0.003), {lesser, greater}}));
+  // One closure leaves .05. Curves may be off by a part of the error, a ten-thousandth at least.
+  EXPECT_LT(fitted(target, {.specular = 2, .threads = 2}).error, 0.005);
+  EXPECT_GT(fitted(target, {.specular = 1, .threads = 2}).error, 0.03);
+}
+
 TEST(ClosuresFit, AddsNoEnergy) {
   const auto measurement = sample_measurement("nickel");
   const Target target = sample_target(
