@@ -169,7 +169,8 @@ void tell(const std::string& path) {
 }  // namespace lobefit
 
 int main(int count, char** paths) {
-  std::printf("| target | sample s | 1: error, s, points | 2 | 3 | bound of 2: one choice, any | of 3 |\n");
+  std::printf("| target | sample s | 1: error, s, points | 2 | 3 |");
+  std::printf(" bound of 2: one choice, any | of 3 |\n");
   std::printf("|---|---|---|---|---|---|---|\n");
   for (int i = 1; i < count; ++i) lobefit::tell(paths[i]);
 }
