@@ -59,14 +59,15 @@ class Search {
   // The best ways through closures of single views, and the best of one closure less with another.
   std::vector<ClosureCurves> starts(const SearchTarget& views, int specular) {
     ViewPaths paths(views, threads_, monitor_);
-    for (int k = 0; k + 1 < specular; ++k) paths = paths.with_one_more(monitor_);
+    for (int k = 0; k + 1 < specular; ++k) paths.add_closure(monitor_);
     if (specular == 0) return paths.ways();
     start_from(paths.ways());
     follow(medium_, 0.1, 10);
     start_from(extended(found_.front().closures));
     follow(views, 0.3, 5);
     keep(4);
-    std::vector<ClosureCurves> all = paths.with_one_more(monitor_).ways();
+    paths.add_closure(monitor_);
+    std::vector<ClosureCurves> all = paths.ways();
     for (FoundCurves& found : found_) all.push_back(std::move(found.closures));
     return all;
   }
@@ -115,6 +116,7 @@ FoundCurves search_curves(const Target& target, int specular, int threads, Monit
 
 FoundCurves refined(const SearchTarget& target, ClosureCurves closures, int threads,
                     const Monitor& monitor) {
+  // Few iterations: whoever limits views looks at them again and goes on.
   closures = descend(target, std::move(closures), last_smoothing, 16, monitor, threads);
   const double error = smooth_error(target, closures, judging_smoothing);
   return {std::move(closures), error};

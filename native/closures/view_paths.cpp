@@ -39,7 +39,7 @@ ViewPaths::ViewPaths(const SearchTarget& views, int threads, const Monitor& moni
   }
 }
 
-ViewPaths ViewPaths::with_one_more(const Monitor& monitor) const {
+void ViewPaths::add_closure(const Monitor& monitor) {
   std::vector<std::map<std::vector<Distribution>, std::vector<ClosureCurves>>> starts(
       views_.size());
   for (const auto& [distributions, by_view] : by_distributions_) {
@@ -51,26 +51,25 @@ ViewPaths ViewPaths::with_one_more(const Monitor& monitor) const {
       }
     }
   }
-  ViewPaths more(views_, threads_);
+  by_distributions_.clear();
   std::vector<OptimaByView*> all;
   for (const auto& [distributions, of_first] : starts.front()) {
-    OptimaByView& optima = more.by_distributions_[distributions];
+    OptimaByView& optima = by_distributions_[distributions];
     optima.resize(views_.size());
     parallel_for(static_cast<int>(views_.size()), threads_, [&, &choice = distributions](int job) {
       const auto view = static_cast<std::size_t>(job);
-      optima[view] = more.optima_from(view, starts[view].at(choice), monitor);
+      optima[view] = optima_from(view, starts[view].at(choice), monitor);
     });
     all.push_back(&optima);
   }
   parallel_for(static_cast<int>(all.size()), threads_,
-               [&](int job) { more.spread(*all[static_cast<std::size_t>(job)], monitor); });
-  return more;
+               [&](int job) { spread(*all[static_cast<std::size_t>(job)], monitor); });
 }
 
 // What is best at one view angle is near the best of the next, but can be far from all starts.
 void ViewPaths::spread(OptimaByView& optima, const Monitor& monitor) const {
   const auto take_over = [&](std::size_t to, std::size_t from) {
-    Optima both = optima[to];
+    Optima both = std::move(optima[to]);
     for (std::size_t i = 0; i < std::min(most_spread, optima[from].size()); ++i) {
       both.push_back(optimum(to, optima[from][i].closures, monitor));
     }

@@ -17,9 +17,9 @@ class ViewPaths {
   // The diffuse closure alone at each view.
   ViewPaths(const SearchTarget& views, int threads, const Monitor& monitor);
 
-  // Those of one specular closure more, found from each of these optima with another of any width
-  // and then from what is best at the angles beside. Throws Cancelled.
-  ViewPaths with_one_more(const Monitor& monitor) const;
+  // Goes on to one specular closure more: found from the best optima with another of any width, and
+  // then from what is best at the angles beside. Throws Cancelled.
+  void add_closure(const Monitor& monitor);
 
   // The best ways, for each choice of distributions and each reluctance to jump.
   std::vector<ClosureCurves> ways() const;
@@ -36,8 +36,6 @@ class ViewPaths {
   using OptimaByView = std::vector<Optima>;
   using Path = std::vector<const Optimum*>;  // one of each view
 
-  ViewPaths(const std::vector<SearchTarget>& views, int threads)
-      : views_(views), threads_(threads) {}
   Optima optima_from(std::size_t view, const std::vector<ClosureCurves>& starts,
                      const Monitor& monitor) const;
   Optimum optimum(std::size_t view, const ClosureCurves& start, const Monitor& monitor) const;

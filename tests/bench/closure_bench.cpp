@@ -3,9 +3,10 @@
 // For each measured file, for the lobe that is fitted to it, and for 1, 2 and 3 specular closures:
 // error, least seconds of three searches on every processor beside the seconds of sampling, and the
 // number of points of all curves. The last columns are bounds for 2 and 3: the sum of the errors of
-// closures that are fitted to each view angle alone, without smooth curves between them: with the
-// distributions that are best for all angles together, as in a material, and with the best for
-// each. No material made of a diffuse and so many such closures can be much nearer than that.
+// closures that are fitted to every third view angle alone, counted thrice, without smooth curves
+// between them: with the distributions that are best for all angles together, as in a material, and
+// with the best for each. No material made of a diffuse and so many such closures can be much
+// nearer than that.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
