@@ -11,7 +11,7 @@ namespace {
 
 // How far curve nodes may be off the curves that were fitted, as a part of what they stand for: so
 // little that the error does not show it.
-double curve_tolerance(double error) { return std::clamp(0.02 * error, 1e-4, 2e-3); }
+double curve_tolerance(double error) { return std::clamp(0.01 * error, 1e-4, 2e-3); }
 
 double least_over_view(const std::function<double(double)>& of_cosine) {
   double least = of_cosine(1);
