@@ -43,10 +43,17 @@ struct ClosureKernelSums {
   double matrix_xx[shapes][shapes];  // W df/dx df/dx, summed over the channels
 };
 
+// Sums over the lights of weight times v_k, and times its derivatives by that closure's shape.
+struct ClosureKernelLight {
+  double v[ClosureKernelSums::closures];
+  double by_shape[ClosureKernelSums::shapes];
+};
+
 // All for at most most_specular_closures. A step toward less error needs no double precision.
 ClosureKernelSums run_closure_kernel(const ClosureKernelInput<float>& input);
 // The sum of weight times |r|, rounded off.
 double run_closure_error(const ClosureKernelInput<float>& input);
 double run_closure_error(const ClosureKernelInput<double>& input);
+ClosureKernelLight run_closure_light(const ClosureKernelInput<float>& input);
 
 }  // namespace lobefit

@@ -19,6 +19,10 @@ double run_closure_error_avx2(const ClosureKernelInput<double>& input) {
   return error_of_closures(input);
 }
 
+ClosureKernelLight run_closure_light_avx2(const ClosureKernelInput<float>& input) {
+  return light_of_closures(input);
+}
+
 }  // namespace lobefit
 
 #endif

@@ -9,5 +9,6 @@ namespace lobefit {
 ClosureKernelSums run_closure_kernel_avx2(const ClosureKernelInput<float>& input);
 double run_closure_error_avx2(const ClosureKernelInput<float>& input);
 double run_closure_error_avx2(const ClosureKernelInput<double>& input);
+ClosureKernelLight run_closure_light_avx2(const ClosureKernelInput<float>& input);
 
 }  // namespace lobefit

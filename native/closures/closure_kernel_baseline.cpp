@@ -18,6 +18,10 @@ double run_closure_error(const ClosureKernelInput<double>& input) {
   return uses_avx2() ? run_closure_error_avx2(input) : error_of_closures(input);
 }
 
+ClosureKernelLight run_closure_light(const ClosureKernelInput<float>& input) {
+  return uses_avx2() ? run_closure_light_avx2(input) : light_of_closures(input);
+}
+
 #else
 
 ClosureKernelSums run_closure_kernel(const ClosureKernelInput<float>& input) {
@@ -30,6 +34,10 @@ double run_closure_error(const ClosureKernelInput<float>& input) {
 
 double run_closure_error(const ClosureKernelInput<double>& input) {
   return error_of_closures(input);
+}
+
+ClosureKernelLight run_closure_light(const ClosureKernelInput<float>& input) {
+  return light_of_closures(input);
 }
 
 #endif

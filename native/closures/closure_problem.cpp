@@ -131,31 +131,27 @@ auto weights_of(const ClosureLayout& layout, const AtView& at) {
   return at.curves.tail(3 * layout.closures()).reshaped(3, layout.closures());
 }
 
-// By how much more than it may of its albedo a view shows of a white world, in each channel.
-Eigen::Vector3d over_limit(const SearchView& view, const WorldExcess& excess) {
-  return (excess.albedo / *view.limited_albedo - most_excess(view.angle.cosine)).cwiseMax(0);
-}
+// What the closures of a view are over a limit, as a part of their albedo, in each channel; and its
+// derivatives by the curves' values.
+using OverLimit = Eigen::Vector3d;
+using OverByCurves = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves>;
 
-// So large that closures which gain by it are over the limit by a few per cent of it.
+// So large that closures which gain by it are over most_excess by a few per cent of it.
 constexpr double excess_weight = 200;
 
-double excess_penalty(const ClosureCurves& closures, const SearchView& view, const AtView& at) {
-  if (!view.limited_albedo) return 0;
-  const WorldExcess excess =
-      world_excess<false>(microfacets(closures, at, view.wo), weights_of(closures.layout, at));
-  return excess_weight / 2 * over_limit(view, excess).squaredNorm();
+// So large that grey closures which gain all their light by it are over most_albedo by a thirtieth.
+// Lowering their weights by the rest costs less than to keep the limit at any price.
+double albedo_weight(const SearchView& view) { return 10 * view.all_light; }
+
+OverLimit over_excess(const SearchView& view, const WorldExcess& excess) {
+  return (excess.albedo / view.limits->albedo - most_excess(view.angle.cosine)).cwiseMax(0);
 }
 
-// Adds the equations of that penalty by the curves' values.
-void add_excess(const ClosureCurves& closures, const SearchView& view, const AtView& at,
-                ViewEquations& equations) {
-  if (!view.limited_albedo) return;
+OverByCurves excess_by_curves(const ClosureCurves& closures, const SearchView& view,
+                              const AtView& at, std::vector<Microfacet> seen,
+                              const WorldExcess& excess) {
   const ClosureLayout& layout = closures.layout;
-  std::vector<Microfacet> seen = microfacets(closures, at, view.wo);
-  const WorldExcess excess = world_excess<true>(seen, weights_of(layout, at));
-  const Eigen::Vector3d over = over_limit(view, excess);
-  if (over.isZero(0)) return;
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_curves> by_curves(3, layout.curves());
+  OverByCurves by_curves(3, layout.curves());
   by_curves.rightCols(3 * layout.closures()) = excess.by_weights;
   for (int k = 0; k < layout.specular; ++k) {
     constexpr double step = 1e-5;
@@ -174,12 +170,78 @@ void add_excess(const ClosureCurves& closures, const SearchView& view, const AtV
     by_curves.middleCols<3>(layout.shape(k, 0)) =
         by_shape * shape_by_curves(at.shapes[index], view.angle.sine);
   }
-  by_curves /= *view.limited_albedo;
-  for (int c = 0; c < 3; ++c) {
-    if (over[c] == 0) by_curves.row(c).setZero();
+  return by_curves / view.limits->albedo;
+}
+
+// What each closure reflects of a white world per weight.
+ClosureKernelLight white_light(const ClosureCurves& closures, const SearchView& view,
+                               const AtView& at) {
+  auto input = kernel_input(closures, at, view.wo, view.singles, 0);
+  input.weight = view.singles.col(SearchView::solid_angle).data();
+  return run_closure_light(input);
+}
+
+OverLimit over_albedo(const ClosureLayout& layout, const SearchView& view, const AtView& at,
+                      const ClosureKernelLight& light) {
+  const Eigen::Map<const Eigen::VectorXd> per_weight(light.v, layout.closures());
+  const Eigen::Vector3d albedo = weights_of(layout, at) * per_weight;
+  return ((albedo.array() - view.limits->most_albedo) / view.limits->albedo).cwiseMax(0);
+}
+
+OverByCurves albedo_by_curves(const ClosureLayout& layout, const SearchView& view, const AtView& at,
+                              const ClosureKernelLight& light) {
+  OverByCurves by_curves(3, layout.curves());
+  for (int k = 0; k < layout.closures(); ++k) {
+    by_curves.middleCols<3>(layout.weight(k, 0)) = light.v[k] * Eigen::Matrix3d::Identity();
+    if (k == layout.specular) break;
+    by_curves.middleCols<3>(layout.shape(k, 0)) =
+        weights_of(layout, at).col(k) *
+        Eigen::Map<const Eigen::RowVector3d>(light.by_shape + 3 * k) *
+        shape_by_curves(at.shapes[static_cast<std::size_t>(k)], view.angle.sine);
   }
-  equations.gradient += excess_weight * by_curves.transpose() * over;
-  equations.matrix += excess_weight * by_curves.transpose() * by_curves;
+  return by_curves / view.limits->albedo;
+}
+
+double limits_penalty(const ClosureCurves& closures, const SearchView& view, const AtView& at) {
+  if (!view.limits) return 0;
+  const ClosureLayout& layout = closures.layout;
+  const double penalty =
+      albedo_weight(view) / 2 *
+      over_albedo(layout, view, at, white_light(closures, view, at)).squaredNorm();
+  if (!view.limits->excess) return penalty;
+  const WorldExcess excess =
+      world_excess<false>(microfacets(closures, at, view.wo), weights_of(layout, at));
+  return penalty + excess_weight / 2 * over_excess(view, excess).squaredNorm();
+}
+
+// Adds the equations of what is over a limit; channels that are not over it count for nothing.
+template <typename ByCurves>
+void add_over(double weight, const OverLimit& over, ByCurves&& by_curves,
+              ViewEquations& equations) {
+  if (over.isZero(0)) return;
+  OverByCurves by = by_curves();
+  for (int c = 0; c < 3; ++c) {
+    if (over[c] == 0) by.row(c).setZero();
+  }
+  equations.gradient += weight * by.transpose() * over;
+  equations.matrix += weight * by.transpose() * by;
+}
+
+// Adds the equations of limits_penalty by the curves' values.
+void add_limits(const ClosureCurves& closures, const SearchView& view, const AtView& at,
+                ViewEquations& equations) {
+  if (!view.limits) return;
+  const ClosureLayout& layout = closures.layout;
+  const ClosureKernelLight light = white_light(closures, view, at);
+  add_over(
+      albedo_weight(view), over_albedo(layout, view, at, light),
+      [&] { return albedo_by_curves(layout, view, at, light); }, equations);
+  if (!view.limits->excess) return;
+  const std::vector<Microfacet> seen = microfacets(closures, at, view.wo);
+  const WorldExcess excess = world_excess<true>(seen, weights_of(layout, at));
+  add_over(
+      excess_weight, over_excess(view, excess),
+      [&] { return excess_by_curves(closures, view, at, seen, excess); }, equations);
 }
 
 ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& view,
@@ -225,7 +287,7 @@ ViewEquations linearise_view(const ClosureCurves& closures, const SearchView& vi
       }
     }
   }
-  add_excess(closures, view, at, result);
+  add_limits(closures, view, at, result);
   return result;
 }
 
@@ -260,7 +322,7 @@ double error_in(const SearchTarget& target, SearchView::Lights<Scalar> SearchVie
     const AtView at = at_view(closures, view.angle);
     of_views[index] =
         run_closure_error(kernel_input(closures, at, view.wo, view.*lights, smoothing)) +
-        excess_penalty(closures, view, at);
+        limits_penalty(closures, view, at);
   });
   return std::accumulate(of_views.begin(), of_views.end(), stiffness_penalty(closures));
 }
@@ -470,8 +532,10 @@ SearchView::SearchView(const TargetView& view) : wo(view.wo), angle(wo.z()) {
     const Rgb reflected = light.reflected / light.typical;
     lights.row(static_cast<Eigen::Index>(i)) << light.wi.transpose().array(),
         light.half.transpose().array(), reflected.cwiseMin(brightest).transpose(),
-        padding ? 0 : light.weight * light.typical, 1 / light.typical;
+        padding ? 0 : light.weight * light.typical, padding ? 0 : light.solid_angle * light.typical,
+        1 / light.typical;
   }
+  all_light = (lights.col(weight) * lights.middleCols<3>(red).rowwise().sum()).sum();
   singles = lights.cast<float>();
 }
 
@@ -506,16 +570,10 @@ Shape shape_at(const ClosureCurves& closures, int closure, double cosine) {
 Eigen::VectorXd light_of_closures(const SearchView& view, const ClosureCurves& closures) {
   const ClosureLayout& layout = closures.layout;
   const AtView at = at_view(closures, view.angle);
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(layout.specular);
+  const auto light = run_closure_light(kernel_input(closures, at, view.wo, view.singles, 0));
+  Eigen::VectorXd sum(layout.specular);
   for (int k = 0; k < layout.specular; ++k) {
-    const Microfacet closure = microfacet(closures, at, k, view.wo);
-    for (Eigen::Index i = 0; i < view.lights.rows(); ++i) {
-      const auto light = view.lights.row(i).matrix();
-      sum[k] += light[SearchView::weight] * light[SearchView::inverse_typical] *
-                closure.evaluate(light.segment<3>(SearchView::wi_x).transpose(),
-                                 light.segment<3>(SearchView::half_x).transpose());
-    }
-    sum[k] *= at.curves.segment<3>(layout.weight(k, 0)).sum();
+    sum[k] = light.v[k] * weights_of(layout, at).col(k).sum();
   }
   return sum;
 }

@@ -12,6 +12,13 @@
 
 namespace lobefit {
 
+// What closures may reflect at a view angle.
+struct ViewLimits {
+  double albedo;        // about what they reflect of a white world in their brightest channel
+  Rgb most_albedo;      // what they may reflect of it in each channel
+  bool excess = false;  // whether what it shows too much of them is limited by most_excess
+};
+
 // What a view angle alone decides.
 struct ViewAngle {
   explicit ViewAngle(double cosine);
@@ -22,8 +29,8 @@ struct ViewAngle {
 
 // A view of a target as the search reads it: its lights in columns, padded by lights of no weight
 // to a multiple of what the kernel takes at once. What they reflect is by what is typical there,
-// and their weight is that of a difference so large: so single precision has the range for any
-// target.
+// and their weight is that of a difference so large, their solid angle multiplied by it: so single
+// precision has the range for any target.
 struct SearchView {
   enum Column {
     wi_x,
@@ -36,6 +43,7 @@ struct SearchView {
     green,
     blue,
     weight,
+    solid_angle,
     inverse_typical,
     columns
   };
@@ -48,9 +56,9 @@ struct SearchView {
   ViewAngle angle;
   Lights<double> lights;
   Lights<float> singles;  // the same in single precision
-  // Where it is given, closures with this albedo count as wrong for what a white world shows too
-  // much of them over most_excess.
-  std::optional<double> limited_albedo = std::nullopt;
+  double all_light;       // what the error counts when all is black
+  // Where they are given, closures count as wrong for what is over them.
+  std::optional<ViewLimits> limits = std::nullopt;
 };
 
 using SearchTarget = std::vector<SearchView>;
@@ -111,7 +119,7 @@ Rgb world_excess(const ClosureCurves& closures, const Vector3& wo);
 double most_excess(double cosine);
 
 // The error, |r| rounded off below `smoothing` times what is typical there, plus a little for
-// curvature, and much for what is over a view's limit.
+// curvature, and much for what is over a view's limits.
 double smooth_error(const SearchTarget& target, const ClosureCurves& closures, double smoothing);
 
 // Levenberg and Marquardt's method on smooth_error, within the bounds of what Cycles can show; ends

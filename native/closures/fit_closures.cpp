@@ -80,28 +80,38 @@ std::vector<SeenAtAngle> look_at(const Target& target, const ClosureSet& closure
   return seen;
 }
 
-// Closures that are bent less where a white world would show too much of them, unless that costs
-// more than a fifth of their error.
-FoundCurves with_limited_bends(const Target& target, const FoundCurves& found, int threads,
-                               const Monitor& monitor) {
+// What closures may reflect of a white world: a little more than the target does.
+Rgb most_albedo(const SeenAtAngle& at) { return 1.01 * at.target_albedo; }
+
+// Closures that are bent less where a white world would show too much of them, and reflect less
+// where they would reflect too much, unless that costs more than a fifth of their error.
+FoundCurves within_limits(const Target& target, const FoundCurves& found, int threads,
+                          const Monitor& monitor) {
   constexpr double most_cost = 1.2;
-  // Views are watched from a part of their limit on, and are over it by more than a part of it.
-  constexpr double watched = 0.7, over = 1.05;
+  // Views are watched from a part of their limits on, and are over them by more than a part.
+  constexpr double watched = 0.7, over = 1.05, watched_albedo = 0.99, over_albedo = 1.005;
   SearchTarget views = in_columns(target);
   FoundCurves limited = found;
-  // Views that were within the limit may come to be over it.
+  // Views that were within their limits may come to be over them; and a descent that stopped at the
+  // edge of new limits goes on when it is begun again.
   for (int round = 0; round < 4; ++round) {
     const std::vector<SeenAtAngle> seen = look_at(
         target, to_closures(limited.closures, curve_tolerance(limited.error), WeightFactors()));
     bool exceeded = false;
     for (std::size_t i = 0; i < views.size(); ++i) {
-      const double albedo = seen[i].closures_albedo.maxCoeff();
-      const double part = world_excess(limited.closures, views[i].wo).maxCoeff() /
-                          (albedo * most_excess(seen[i].cosine));
-      if (part > watched) views[i].limited_albedo = albedo;
-      exceeded = exceeded || part > over;
+      std::optional<ViewLimits>& limits = views[i].limits;
+      const Rgb& albedo = seen[i].closures_albedo;
+      const Rgb most = most_albedo(seen[i]);
+      const double excess = world_excess(limited.closures, views[i].wo).maxCoeff() /
+                            (albedo.maxCoeff() * most_excess(seen[i].cosine));
+      // Closures go on to reflect a little more than they may where that is worth it.
+      const bool reflects_more = !limits && (albedo > over_albedo * most).any();
+      exceeded = exceeded || excess > over || reflects_more;
+      if (excess > watched || (albedo > watched_albedo * most).any()) {
+        limits = {albedo.maxCoeff(), most, excess > watched || (limits && limits->excess)};
+      }
     }
-    if (!exceeded) break;
+    if (!exceeded && round != 1) break;
     limited = refined(views, std::move(limited.closures), threads, monitor);
   }
   return limited.error < most_cost * found.error ? limited : found;
@@ -109,13 +119,12 @@ FoundCurves with_limited_bends(const Target& target, const FoundCurves& found, i
 
 // Where closures reflect more than they may, the factors that mend it.
 WeightFactors energy_factors(const std::vector<SeenAtAngle>& seen, bool cap_albedo) {
-  constexpr double allowed = 1.01;
   WeightFactors factors;
   for (std::size_t c = 0; c < 3; ++c) {
     const auto channel = static_cast<Eigen::Index>(c);
     std::vector<ViewCurve::Point> points;
     for (const SeenAtAngle& at : seen) {
-      double most = allowed * at.target_albedo[channel];
+      double most = most_albedo(at)[channel];
       if (cap_albedo) most = std::min(most, 1.0);
       const double now = at.closures_albedo[channel];
       points.push_back({at.cosine, now > most ? most / now : 1});
@@ -173,7 +182,7 @@ FittedClosures fit_closures(const Target& target, const ClosureFitOptions& optio
                             Monitor& monitor) {
   if (target.empty()) return {};
   const int threads = thread_count(options.threads);
-  const FoundCurves best = with_limited_bends(
+  const FoundCurves best = within_limits(
       target, search_curves(target, options.specular, threads, monitor), threads, monitor);
   const double tolerance = curve_tolerance(best.error);
   WeightFactors factors;

@@ -124,7 +124,7 @@ class FreeClosures {
     for (const double smoothing : {0.3, 0.03, 0.01, 0.002}) {
       closures = descend(views_[view], std::move(closures), smoothing, 20, monitor);
     }
-    const double error = smooth_error(views_[view], closures, 1e-3);
+    const double error = smooth_error(views_[view], closures, 1e-7);  // not rounded off
     if (best.closures.distributions.empty() || error < best.error) best = {closures, error};
   }
 
