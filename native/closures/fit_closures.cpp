@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "closures/closure_search.h"
 #include "measurement/parallel.h"
