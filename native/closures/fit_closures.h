@@ -32,9 +32,9 @@ struct FittedClosures {
 // The diffuse closure and `specular` GGX or Beckmann closures whose sum is nearest to the target by
 // error_of. Their roughness, anisotropy, bend and weights are smooth curves of the cosine of the
 // view angle, all view angles fitted jointly; at normal incidence they are isotropic and not bent.
-// Where they would reflect over 1 % more than the target, their weights are lowered. A closure that
-// the error does not miss is left out. A target without samples gives no closures and the error 0.
-// Throws Cancelled.
+// The search keeps them near the target's albedo; where they still reflect over 1 % more, their
+// weights are lowered. A closure that the error does not miss is left out. A target without samples
+// gives no closures and the error 0. Throws Cancelled.
 FittedClosures fit_closures(const Target& target, const ClosureFitOptions& options,
                             Monitor& monitor);
 
